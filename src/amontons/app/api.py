@@ -95,7 +95,9 @@ def solve_as_asked(
     assembled, compiled = now() - began, compiling() - compiled
     begin = start.solution if isinstance(start, ModelSolution) else start
     with progress(asked.callback, asked.tolerance) as seen:
-        found = drive_as_asked(discrete, replace(asked, callback=seen), begin, solver)
+        if seen is not asked.callback:
+            asked = replace(asked, callback=seen)
+        found = drive_as_asked(discrete, asked, begin, solver)
     if model is None:
         return _logged(found)
     record = found.convergence

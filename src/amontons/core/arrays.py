@@ -7,7 +7,7 @@ code sees them, which takes their indices on trust.
 
 from __future__ import annotations
 
-from copy import copy
+import math
 from numbers import Number
 from typing import Any, TypeVar
 
@@ -15,6 +15,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from scipy import sparse
 
+from .canonical import largest as largest_entry
 from .canonical import size_of_canonical
 from .errors import InvalidInput, number_hint, shown
 
@@ -184,7 +185,8 @@ def _copied(matrix: Any) -> Any:
     size = size_of_canonical(*arrays, lines, width)
     if not (1 / LARGEST <= size <= LARGEST):
         return None
-    out = copy(matrix)
+    out = object.__new__(type(matrix))  # as copy() does, without its way there
+    vars(out).update(vars(matrix))
     out.indptr, out.indices, out.data = (read_only(array.copy()) for array in arrays)
     return out
 
@@ -297,8 +299,8 @@ def locked(matrix):
 
 def squarable(name: str, array: Array, largest: float = LARGEST) -> Array:
     """The same array, locked, of finite numbers whose squares are numbers, or as `largest`."""
-    size = float(np.abs(array).max(initial=0.0))
-    if not np.isfinite(size):
+    size = largest_entry(array.reshape(-1))
+    if not size < math.inf:
         _finite(name, array)
     _squarable(name, size, largest)
     return read_only(array)

@@ -1,4 +1,4 @@
-"""One compiled look at a compressed sparse matrix, for what is to be put right in it."""
+"""One compiled look at numbers from outside, for what is to be put right in them."""
 
 from __future__ import annotations
 
@@ -31,3 +31,24 @@ def size_of_canonical(indptr, indices, data, lines, width):
                 return -1.0
             size = max(size, abs(data[k]))
     return size
+
+
+@njit(cache=True, error_model="numpy")
+def largest(values):
+    """The largest |entry| of values (k,), 0 of none; nan where one is not a number."""
+    size = 0.0
+    for value in values:
+        if not abs(value) <= size:
+            size = abs(value)
+            if size != size:
+                break
+    return size
+
+
+@njit(cache=True, error_model="numpy")
+def are_within(values, low, high):
+    """True where all values (k,) are numbers from low to high."""
+    for value in values:
+        if not low <= value <= high:
+            return False
+    return True

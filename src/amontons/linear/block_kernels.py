@@ -5,12 +5,14 @@ from __future__ import annotations
 import math
 
 import numpy as np
+from numba import uint64
 
 from ..core.compiled import njit
 
 WELL_CONDITIONED = 1e-6  # |det A| / max|A|^3 from which A^-1 loses no digits that matter
 TURNS = 12  # of Jacobi's method at most; three or four do
 ALIKE = 1e-17  # entry beside the diagonal, relative to it, that is none
+NEXT, AFTER = (1, 2, 0), (2, 0, 1)  # of the three axes
 
 
 @njit(cache=True, error_model="numpy")
@@ -29,6 +31,26 @@ def _finished(start, column, data, d):
 
 
 @njit(cache=True, error_model="numpy")
+def _contact_of(k, d):
+    """k // d of an index k >= 0, d = 2 or 3: a division by a constant is no division."""
+    return np.int64(uint64(k) // uint64(3)) if d == 3 else np.int64(uint64(k) >> uint64(1))
+
+
+@njit(cache=True, error_model="numpy")
+def _distinct_rows(indptr, indices, first, d):
+    """How many of the d rows from `first` on have to be looked at for columns: 1 or d."""
+    begin, size = indptr[first], indptr[first + 1] - indptr[first]
+    for a in range(1, d):
+        shift = indptr[first + a] - begin
+        if indptr[first + a + 1] - indptr[first + a] != size:
+            return d
+        for k in range(begin, begin + size):
+            if indices[k + shift] != indices[k]:
+                return d
+    return 1
+
+
+@njit(cache=True, error_model="numpy")
 def blocks_of_rows(indptr, indices, values, d):
     """Block rows of a matrix (nc d, nc d) in compressed rows, in any order, summed if double.
 
@@ -37,11 +59,16 @@ def blocks_of_rows(indptr, indices, values, d):
     nc = (len(indptr) - 1) // d
     mark = np.full(nc, -1, np.int32)
     start = np.zeros(nc + 1, np.int32)
+    rows = np.empty(nc, np.int8)
     for i in range(nc):
-        count = 1
+        count, end = 1, 0
         mark[i] = i
-        for k in range(indptr[d * i], indptr[d * i + d]):
-            j = indices[k] // d
+        rows[i] = _distinct_rows(indptr, indices, d * i, d)
+        for k in range(indptr[d * i], indptr[d * i + rows[i]]):
+            if end - d <= indices[k] < end:  # the block of the entry before
+                continue
+            j = _contact_of(indices[k], d)
+            end = d * j + d
             if mark[j] != i:
                 mark[j] = i
                 count += 1
@@ -52,11 +79,14 @@ def blocks_of_rows(indptr, indices, values, d):
     mark[:] = -1
     for i in range(nc):
         first = start[i]
-        count = 1
+        count, end = 1, 0
         mark[i] = i
         column[first] = i
-        for k in range(indptr[d * i], indptr[d * i + d]):
-            j = indices[k] // d
+        for k in range(indptr[d * i], indptr[d * i + rows[i]]):
+            if end - d <= indices[k] < end:
+                continue
+            j = _contact_of(indices[k], d)
+            end = d * j + d
             if mark[j] != i:
                 mark[j] = i
                 at = first + count
@@ -69,7 +99,7 @@ def blocks_of_rows(indptr, indices, values, d):
             place[column[at]] = at
         for a in range(d):
             for k in range(indptr[d * i + a], indptr[d * i + a + 1]):
-                j = indices[k] // d
+                j = _contact_of(indices[k], d)
                 data[place[j], a, indices[k] - d * j] += values[k]
     return start, column, data, _finished(start, column, data, d)
 
@@ -112,30 +142,36 @@ def blocks_of_dense(W, d):
 
 
 @njit(cache=True, error_model="numpy")
-def _largest_eigenvalue(B):
-    """Of a symmetric (3, 3) matrix, by Jacobi's rotations; B is overwritten."""
+def _turn(x, y, z):
+    """(c, s, t) of the rotation that makes z, between the diagonal entries x and y, vanish."""
+    theta = (y - x) / (2.0 * z)  # at most 1 / ALIKE
+    t = 1.0 / (abs(theta) + math.sqrt(theta * theta + 1.0))
+    if theta < 0.0:
+        t = -t
+    c = 1.0 / math.sqrt(t * t + 1.0)
+    return c, t * c, t
+
+
+@njit(cache=True, error_model="numpy")
+def _largest_eigenvalue(x, y, z, xy, xz, yz):
+    """Of the symmetric [[x, xy, xz], [xy, y, yz], [xz, yz, z]], by Jacobi's rotations."""
     for _ in range(TURNS):
-        rest = 0.0
-        for p in range(2):
-            for q in range(p + 1, 3):
-                rest = max(rest, abs(B[p, q]))
-                if abs(B[p, q]) <= ALIKE * max(B[p, p], B[q, q]):
-                    continue
-                theta = (B[q, q] - B[p, p]) / (2.0 * B[p, q])  # at most 1 / ALIKE
-                t = 1.0 / (abs(theta) + math.sqrt(theta * theta + 1.0))
-                if theta < 0.0:
-                    t = -t
-                c = 1.0 / math.sqrt(t * t + 1.0)
-                s = t * c
-                for k in range(3):
-                    x, y = B[p, k], B[q, k]
-                    B[p, k], B[q, k] = c * x - s * y, s * x + c * y
-                for k in range(3):
-                    x, y = B[k, p], B[k, q]
-                    B[k, p], B[k, q] = c * x - s * y, s * x + c * y
-        if rest <= ALIKE * max(B[0, 0], B[1, 1], B[2, 2]):
+        rest = max(abs(xy), abs(xz), abs(yz))
+        if abs(xy) > ALIKE * max(x, y):
+            c, s, t = _turn(x, y, xy)
+            x, y, xy = x - t * xy, y + t * xy, 0.0
+            xz, yz = c * xz - s * yz, s * xz + c * yz
+        if abs(xz) > ALIKE * max(x, z):
+            c, s, t = _turn(x, z, xz)
+            x, z, xz = x - t * xz, z + t * xz, 0.0
+            xy, yz = c * xy - s * yz, s * xy + c * yz
+        if abs(yz) > ALIKE * max(y, z):
+            c, s, t = _turn(y, z, yz)
+            y, z, yz = y - t * yz, z + t * yz, 0.0
+            xy, xz = c * xy - s * xz, s * xy + c * xz
+        if rest <= ALIKE * max(x, y, z):
             break
-    return max(B[0, 0], B[1, 1], B[2, 2])
+    return max(x, y, z)
 
 
 @njit(cache=True, error_model="numpy")
@@ -143,7 +179,7 @@ def contact_data(data, diagonal):
     """(eliminated (nc, 17), 1 / |W_ii|_2 (nc,)), see `BlockRows`; 0 where W_ii is 0."""
     nc = len(diagonal)
     out, rho = np.zeros((nc, 17)), np.zeros(nc)
-    square = np.empty((3, 3))
+    B, c = np.empty((3, 3)), np.empty((3, 3))
     for i in range(nc):
         A = data[diagonal[i]]
         e = out[i]
@@ -155,27 +191,27 @@ def contact_data(data, diagonal):
             continue
         for a in range(3):
             for b in range(3):
-                total = 0.0
-                for k in range(3):
-                    total += (A[k, a] / size) * (A[k, b] / size)
-                square[a, b] = total
-        rho[i] = 1.0 / (size * math.sqrt(_largest_eigenvalue(square)))
-        # cofactors of A / size, so that no product leaves the range of floats
-        c = square
+                B[a, b] = A[a, b] / size  # so that no product leaves the range of floats
+        rho[i] = 1.0 / (size * math.sqrt(_largest_eigenvalue(
+            B[0, 0] * B[0, 0] + B[1, 0] * B[1, 0] + B[2, 0] * B[2, 0],
+            B[0, 1] * B[0, 1] + B[1, 1] * B[1, 1] + B[2, 1] * B[2, 1],
+            B[0, 2] * B[0, 2] + B[1, 2] * B[1, 2] + B[2, 2] * B[2, 2],
+            B[0, 0] * B[0, 1] + B[1, 0] * B[1, 1] + B[2, 0] * B[2, 1],
+            B[0, 0] * B[0, 2] + B[1, 0] * B[1, 2] + B[2, 0] * B[2, 2],
+            B[0, 1] * B[0, 2] + B[1, 1] * B[1, 2] + B[2, 1] * B[2, 2],
+        )))  # fmt: skip
         for a in range(3):
             for b in range(3):
-                p, q, r, s = (a + 1) % 3, (a + 2) % 3, (b + 1) % 3, (b + 2) % 3
-                c[a, b] = (A[p, r] / size) * (A[q, s] / size) - (A[p, s] / size) * (
-                    A[q, r] / size
-                )
+                p, q, r, s = NEXT[a], AFTER[a], NEXT[b], AFTER[b]
+                c[a, b] = B[p, r] * B[q, s] - B[p, s] * B[q, r]  # cofactors
         det = 0.0
         for b in range(3):
-            det += A[0, b] / size * c[0, b]
+            det += B[0, b] * c[0, b]
         if abs(det) > WELL_CONDITIONED and A[0, 0] > 0.0:
-            e[0] = 1.0
+            e[0], share = 1.0, 1.0 / det / size
             for a in range(3):
                 for b in range(3):
-                    e[1 + 3 * a + b] = c[b, a] / det / size
+                    e[1 + 3 * a + b] = c[b, a] * share
         own = A[0, 0] if A[0, 0] > 0.0 else 1.0
         e[10], e[11] = A[1, 0] / own, A[2, 0] / own
         e[12], e[13] = A[1, 1] - e[10] * A[0, 1], A[1, 2] - e[10] * A[0, 2]

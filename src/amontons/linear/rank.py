@@ -56,7 +56,7 @@ def matrix_rank(matrix: sparse.sparray, deadline: Deadline = NEVER) -> Rank:
     A = _scaled(sparse.csr_array(matrix))
     found, A = _peeled(A)
     value = least = found
-    for rows, columns in _components(A):
+    for rows, columns in components(A):
         part = sparse.csr_array(A[rows][:, columns])
         high, low = _rank_of_part(part, deadline)
         value, least = value + high, least + low
@@ -106,7 +106,7 @@ def _peeled(A: sparse.csr_array) -> tuple[int, sparse.csr_array]:
     return found, A
 
 
-def _components(A: sparse.csr_array) -> list[tuple[Index, Index]]:
+def components(A: sparse.csr_array) -> list[tuple[Index, Index]]:
     """Rows and columns of the parts of A that do not touch, those without entries left out."""
     from scipy.sparse import csgraph
 

@@ -19,12 +19,21 @@ from ..problem.judge.measures import Criterion, Measure, ratio
 from ..problem.settling import Settled
 from ..problem.solution import Convergence, FrictionSolution, Outcome, Step
 from .asked import Asked
-from .auto.first_stage import CHANGED, CONTACT, ERROR, HIDDEN, START, SWEEPS, WORST, Together
+from .auto.first_stage import (
+    CHANGED,
+    CONTACT,
+    ERROR,
+    HIDDEN,
+    START,
+    SWEEPS,
+    WORST,
+    Together,
+    is_brief,
+)
 from .first_iterate import first_iterate
 from .judging import BLUR
 
 Array = NDArray[np.float64]
-SMALL = 30  # contacts of a problem that is solved here before the driver sees it
 STAGE = "Anderson Gauss-Seidel"  # as the first track of the race is called
 
 
@@ -56,13 +65,13 @@ def at_once(problem: Any, asked: Asked, start: Any) -> FrictionSolution | None:
     if not isinstance(problem, FrictionProblem) or problem.form is Form.GLOBAL:
         return None
     plain = asked.callback is None and asked.criterion is Criterion.JUDGE
-    if not plain or asked.max_iterations is not None or problem.contacts > SMALL:
+    if not plain or asked.max_iterations is not None or not is_brief(problem, asked.tolerance):
         return None
     began, compiled = now(), compiling()
     mine = local_form(problem)
     if mine is None or asked.deadline.work is not None or asked.deadline.passed:
         return None
-    together = Together([mine], asked.tolerance, begin_of(mine, start))
+    together = Together([mine], asked.tolerance, begin_of(mine, start), asked.of_contacts)
     together.solve(0, 1)
     return told(together, 0, problem, asked, now() - began, compiling() - compiled)
 

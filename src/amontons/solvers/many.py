@@ -72,7 +72,9 @@ def solve_many(
             for k, mine in local.items():
                 with _named("starts", k):
                     rows.append(begin_of(mine, begins[k]))
-            together = Together(list(local.values()), asked.tolerance, np.concatenate(rows))
+            together = Together(
+                list(local.values()), asked.tolerance, np.concatenate(rows), asked.of_contacts
+            )
             seconds = _in_ranges(pool, together, end)
             for p, k in enumerate(local):
                 out[k] = told(together, p, problems[k], asked, float(seconds[p]))

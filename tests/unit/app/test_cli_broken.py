@@ -361,13 +361,13 @@ def test_file_with_both_groups(tmp_path, monkeypatch):
     check_refused(*run(["solve", "both.hdf5"], tmp_path, monkeypatch), ["both"])
 
 
-def test_file_with_bilateral_constraints(tmp_path, monkeypatch):
+def test_file_with_constraints_that_contradict(tmp_path, monkeypatch):
     path = tmp_path / "rod.hdf5"
     write_fclib(box_tower(1), path)
     with h5py.File(path, "a") as file:
         file.copy("fclib_global/H", "fclib_global/G")
-        file["fclib_global/vectors/b"] = np.zeros(12)
-    words = ["fclib_global/G", "not supported"]
+        file["fclib_global/vectors/b"] = np.arange(12.0)
+    words = ["fclib_global/vectors/b", "contradict"]
     check_refused(*run(["solve", "rod.hdf5"], tmp_path, monkeypatch), words)
 
 

@@ -101,7 +101,7 @@ def _output(
     if isinstance(found, ModelSolution):
         return replace(found.output, title=opened.title, method=method, notes=opened.notes)
     return output.Output(found, title=opened.title, method=method, warnings=found.warnings,
-                         from_fclib=opened.path is not None)  # fmt: skip
+                         from_fclib=opened.path is not None, notes=opened.notes)  # fmt: skip
 
 
 def _verdict(

@@ -15,4 +15,13 @@ def read(path: Path, overrides: Sequence[str] = (), method: str | None = None) -
     """The problem in a file; overrides can only speak of the solver."""
     problem = fclib.read_fclib(path)
     settings = override_settings(Settings(method or "auto"), overrides)
-    return Case(problem, settings, path.stem, path)
+    return Case(problem, settings, path.stem, path, notes=_notes(problem))
+
+
+def _notes(problem: fclib.FclibProblem) -> tuple[str, ...]:
+    """How many equality constraints there are."""
+    if problem.equalities is None:
+        return ()
+    count = problem.equalities.count
+    return (f"{count} equality constraint{'s' if count > 1 else ''}, eliminated; their "
+            "multipliers are l of the group solution",)  # fmt: skip

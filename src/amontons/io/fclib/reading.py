@@ -12,12 +12,20 @@ import numpy as np
 
 from ...core.errors import FileFormatError, InvalidInput
 from ...core.hdf5 import TEXT, check_contained
+from ...problem.equalities import GlobalEqualities, LocalEqualities
 from ...problem.friction import Form
 from .matrices import read_matrix
 from .source import DAMAGE, Array, Source, check_is_file
-from .stored import GROUPS, TEXTS, WITH_ATTRIBUTES, FclibProblem, StoredText
+from .stored import (
+    GROUPS,
+    TEXTS,
+    WITH_ATTRIBUTES,
+    FclibProblem,
+    StoredMatrix,
+    StoredText,
+)
 
-BILATERAL = {Form.DELASSUS: ("V", "R", "vectors/s"), Form.GLOBAL: ("G", "vectors/b")}
+EQUALITIES = {Form.DELASSUS: (("V", "R"), "s"), Form.GLOBAL: (("G",), "b")}
 
 
 def read_fclib(path: str | os.PathLike[str]) -> FclibProblem:
@@ -49,7 +57,6 @@ def _read(source: Source) -> FclibProblem:
     d = source.integer(f"{root}/spacedim")
     if d not in (2, 3):
         raise source.error(f"{root}/spacedim", f"expected 2 or 3, got {d}")
-    _refuse_bilateral(source, root, form)
     source.group(f"{root}/vectors")
     mu = source.reals(f"{root}/vectors/mu")
     bad = np.flatnonzero(mu < 0)
@@ -85,20 +92,45 @@ def _root(source: Source) -> str:
     return found[0]
 
 
-def _refuse_bilateral(source: Source, root: str, form: Form) -> None:
-    """Equality constraints change the problem: never drop them silently. Empty ones pass."""
-    for name in BILATERAL[form]:
-        where = f"{root}/{name}"
+def _constrained(
+    source: Source, root: str, problem: FclibProblem, stored: dict[str, StoredMatrix]
+) -> FclibProblem:
+    """The problem with the equality constraints of its file, if there are any."""
+    names, vector = EQUALITIES[problem.form]
+    if not _has_equalities(source, root, names, vector):
+        return replace(problem, stored=stored)
+    count = source.integer(f"{root}/{names[-1]}/n")
+    rows = {"G": problem.unknowns, "V": problem.unknowns, "R": count}
+    read = {name: read_matrix(source, f"{root}/{name}", (rows[name], count)) for name in names}
+    right = source.reals(f"{root}/vectors/{vector}", count)
+    make = GlobalEqualities if problem.form is Form.GLOBAL else LocalEqualities
+    try:
+        found = make.of(problem, *(read[name].matrix for name in names), right)
+    except InvalidInput as reason:
+        at = str(reason.at[0]) if reason.at else names[-1]
+        place = f"vectors/{at}" if at == vector else at
+        raise source.error(f"{root}/{place}", reason.text) from None
+    stored |= {name: replace(read[name], matrix=getattr(found, name)) for name in names}
+    return replace(FclibProblem.of_equalities(found), stored=stored)
+
+
+def _has_equalities(source: Source, root: str, names: tuple[str, ...], vector: str) -> bool:
+    """Whether the file has constraints; empty ones are none.
+
+    Some without others are refused: nothing that is in a file is dropped silently.
+    """
+    there = [name for name in names if f"{root}/{name}" in source.file]
+    if not there:
+        where = f"{root}/vectors/{vector}"
         node = source.file.get(where)
-        if node is None:
-            continue
-        if isinstance(node, h5py.Group):
-            empty = 0 in (source.integer(f"{where}/m"), source.integer(f"{where}/n"))
-        else:
-            empty = isinstance(node, h5py.Dataset) and not node.size
-        if not empty:
-            raise source.error(where, "bilateral constraints are not supported; "
-                               "eliminate them, or add them to M as stiff springs")  # fmt: skip
+        if isinstance(node, h5py.Dataset) and node.size:
+            raise source.error(where, f"expected a group {' and a group '.join(names)} beside "
+                               "it, which this is the right-hand side of")  # fmt: skip
+        return False
+    for name in names:
+        source.group(f"{root}/{name}")
+    sizes = [source.integer(f"{root}/{name}/{key}") for name in names for key in ("m", "n")]
+    return 0 not in sizes
 
 
 def _contact_vector(source: Source, where: str, d: int, mu: Array) -> Array:
@@ -117,7 +149,7 @@ def _read_local(source: Source, root: str, d: int, mu: Array) -> FclibProblem:
     W = read_matrix(source, f"{root}/W", (q.size, q.size))
     problem = FclibProblem.from_delassus(W.matrix, q, mu, name=source.path.stem)
     assert isinstance(problem, FclibProblem)
-    return replace(problem, stored={"W": replace(W, matrix=problem.W)})
+    return _constrained(source, root, problem, {"W": replace(W, matrix=problem.W)})
 
 
 def _read_global(source: Source, root: str, d: int, mu: Array) -> FclibProblem:
@@ -128,7 +160,7 @@ def _read_global(source: Source, root: str, d: int, mu: Array) -> FclibProblem:
     problem = FclibProblem.from_global(M.matrix, H.matrix, f, w, mu, name=source.path.stem)
     assert isinstance(problem, FclibProblem)
     stored = {"M": replace(M, matrix=problem.M), "H": replace(H, matrix=problem.H)}
-    return replace(problem, stored=stored)
+    return _constrained(source, root, problem, stored)
 
 
 def _texts(source: Source, root: str) -> dict[str, bytes]:

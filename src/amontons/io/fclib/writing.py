@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+from typing import Any
 
 import h5py
 import numpy as np
@@ -17,6 +18,8 @@ from .memory import write_hdf5
 from .stored import GROUPS, FclibProblem, StoredMatrix, StoredText
 
 PACKED = 2000  # entries above which an array is compressed
+VECTORS = ("f", "w", "q", "b", "s")
+MATRICES = ("M", "H", "W", "G", "V", "R")
 
 
 def write_fclib(
@@ -60,21 +63,22 @@ def put_fclib(
     root = file.create_group(next(k for k, form in GROUPS.items() if form is problem.form))
     root["spacedim"] = np.array([problem.dimension], dtype=np.int32)
     vectors = root.create_group("vectors")
-    for name in ("f", "w", "q"):
-        values = getattr(problem, name)
+    held = _contents(problem)
+    for name in VECTORS:
+        values = held.get(name)
         if values is not None:
             _put(vectors, name, values.ravel())
     _put(vectors, "mu", mu)
-    for name in ("M", "H", "W"):
-        if getattr(problem, name) is not None:
+    for name in MATRICES:
+        if held.get(name) is not None:
             group = root.create_group(name)
-            _put_matrix(group, _storage(problem, name))
+            _put_matrix(group, _storage(problem, name, held[name]))
             _put_attributes(group, problem)
     info = root.create_group("info")
     _put_texts(info, problem, title, description)
     _put_attributes(info, problem)
     if solution is not None:
-        _put_solution(file.create_group("solution"), solution)
+        _put_solution(file.create_group("solution"), problem, solution)
 
 
 def put_arrays(
@@ -86,17 +90,27 @@ def put_arrays(
         file[name] = values
 
 
-def _put_solution(group: h5py.Group, solution: FrictionSolution) -> None:
-    """FCLib's standard group: r, u and, for the global form, v."""
+def _put_solution(
+    group: h5py.Group, problem: FrictionProblem, solution: FrictionSolution
+) -> None:
+    """FCLib's standard group: r, u, for the global form v, of equality constraints l."""
     _put(group, "r", solution.r.ravel())
     _put(group, "u", solution.u.ravel())
     if solution.v is not None:
         _put(group, "v", solution.v)
+    if isinstance(problem, FclibProblem) and problem.holds_equalities:
+        _put(group, "l", problem.multipliers(solution))
 
 
-def _storage(problem: FrictionProblem, name: str) -> StoredMatrix:
+def _contents(problem: FrictionProblem) -> dict[str, Any]:
+    """Vectors and matrices by name, with equality constraints as their file has them."""
+    if isinstance(problem, FclibProblem):
+        return problem.in_file
+    return {name: getattr(problem, name) for name in ("f", "w", "q", "M", "H", "W")}
+
+
+def _storage(problem: FrictionProblem, name: str, matrix: Any) -> StoredMatrix:
     """The file's own storage while the matrix is still that of the file, else a fresh one."""
-    matrix = getattr(problem, name)
     old = problem.stored.get(name) if isinstance(problem, FclibProblem) else None
     if old is not None and old.matrix is matrix:
         return old

@@ -31,6 +31,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from ...core.arrays import LARGEST, read_only, real
+from ...core.canonical import are_within
 from ...core.compiled import njit
 from ...core.errors import InvalidInput
 from ...core.locks import KeepsLocks
@@ -243,10 +244,12 @@ def per_contact(name: str, value: ArrayLike) -> Array:
 
     The square of a huge one is no number any more.
     """
-    array = np.atleast_1d(real(name, value))
+    array = real(name, value)
+    if array.ndim != 1:
+        array = np.atleast_1d(array)
     if array.ndim != 1:
         raise InvalidInput(f"{name}: expected shape (nc,), got {array.shape}")
-    if array.size == 0 or (array.min() >= 0 and array.max() <= LARGEST):  # not where it is nan
+    if are_within(array, 0.0, LARGEST):
         return read_only(array)
     bad = np.flatnonzero(~np.isfinite(array) | (array < 0))
     if bad.size:
@@ -279,4 +282,6 @@ def columns_of(mu: ArrayLike, bound: ArrayLike, size: int) -> Array:
 
 def kinds_of(kind: Kind, size: int) -> Kinds:
     """Kinds (nc,), read-only, all the same."""
-    return read_only(np.full(size, kind, dtype=np.int8))
+    out = np.empty(size, np.int8)
+    out.fill(kind)
+    return read_only(out)

@@ -21,6 +21,7 @@ from ...core.compiled import njit
 from ...problem.friction import FrictionProblem
 from ...problem.judge.contacts import assess
 from ...problem.judge.measures import natural_error
+from ..judging import TIGHTER
 from ..sweeps.kernels import (
     EXACT,
     FIRST_JUDGED,
@@ -36,8 +37,22 @@ from .tracks import DEPTH, LEAST
 
 Array = NDArray[np.float64]
 Counts = NDArray[np.int64]
+SHORT = 5e3  # nanoseconds of a sweep of a problem that is solved here whatever its tolerance
+COARSE, BLOCKS = 1e-4, 10_000  # tolerance from which, blocks of W to which larger ones are
 # Columns of what is told of a problem.
 SWEEPS, START, ERROR, WORST, CONTACT, HIDDEN, CHANGED, WORK = range(8)
+
+
+def is_brief(problem: FrictionProblem, tolerance: float) -> bool:
+    """True where this stage is likely to be all that a problem needs.
+
+    If it is not, its sweeps are made once more: where they are few and as cheap as the calls of
+    the race, or where the goal is so near that most problems reach it in them.
+    """
+    blocks = len(problem.blocks.indices)
+    if nanoseconds_of_sweep(blocks, problem.contacts, HISTORY_CONTACT) <= SHORT:
+        return True
+    return tolerance >= COARSE and blocks <= BLOCKS
 
 
 def sweeps_of_first_chunks(blocks: int, contacts: int) -> int:
@@ -51,14 +66,15 @@ def sweeps_of_first_chunks(blocks: int, contacts: int) -> int:
 
 @njit(cache=True, error_model="numpy", nogil=True)
 def solve_range(  # noqa: PLR0913
-    first, last, sizes, limits, goals, data, floor, r, u, kept, status, sliding, told
+    first, last, sizes, limits, goals, weakest, data, floor, r, u, kept, status, sliding, told
 ):
     """Solve problems first to last - 1, from r; those that are not solved have error inf.
 
     sizes (problems + 1, 2): contacts and blocks of all before a problem; limits (problems,):
-    sweeps at most; goals: errors.  data: arrays of all problems one behind the other, a row of
-    indptr more for each.  Fills r, u, kept (contacts, 3), status, sliding (contacts,) and told
-    (problems, 8), see the columns; errors unit of u.
+    sweeps at most; goals: errors; weakest (problems,): error of a contact beyond which the
+    goal is made tighter, as the driver does.  data: arrays of all problems one behind the
+    other, a row of indptr more for each.  Fills r, u, kept (contacts, 3), status, sliding
+    (contacts,) and told (problems, 8), see the columns; errors unit of u.
     """
     indptr, indices, blocks, q, kind, parameters, rho, diagonal, eliminated = data
     for p in range(first, last):
@@ -71,28 +87,36 @@ def solve_range(  # noqa: PLR0913
         )  # fmt: skip
         x, nc = r[a:b], b - a
         error = natural_error(s.indptr, s.indices, s.data, s.q, s.kind, s.parameters, s.rho, x)
-        told[p, SWEEPS], told[p, START] = 0.0, error
-        if not error <= goal:
-            watch = np.array([goal, FIRST_JUDGED * goal, math.inf])
-            history = np.empty((2, DEPTH + 1, 3 * nc))
-            gram, count = np.zeros((DEPTH + 1, DEPTH)), np.zeros(2, dtype=np.int64)
-            told[p, SWEEPS] = anderson_inplace(
-                s, x, x.copy(), history, gram, count, limits[p], watch
-            )
-            error = watch[2]
-        told[p, ERROR], told[p, WORK], told[p, CHANGED] = error, work[0], 0.0
-        while error <= goal:
-            found, worst, contact, hidden, changed = assess(
-                s.indptr, s.indices, s.data, s.q, s.kind, s.parameters, s.rho, x, floor[a:b],
-                u[a:b], kept[a:b], status[a:b], sliding[a:b],
-            )  # fmt: skip
-            told[p, WORST], told[p, CONTACT], told[p, HIDDEN] = worst, contact, hidden
-            if told[p, CHANGED] > 0.0:
-                told[p, ERROR] = found
-            if not changed:
+        told[p, SWEEPS], told[p, START], told[p, CHANGED] = 0.0, error, 0.0
+        history = np.empty((2, DEPTH + 1, 3 * nc))
+        gram, count = np.zeros((DEPTH + 1, DEPTH)), np.zeros(2, dtype=np.int64)
+        left = limits[p]
+        while True:
+            if not error <= goal and left > 0:
+                watch = np.array([goal, FIRST_JUDGED * goal, math.inf])
+                gram[:], count[:] = 0.0, 0
+                done = anderson_inplace(s, x, x.copy(), history, gram, count, left, watch)
+                left -= done
+                told[p, SWEEPS] += done
+                error = watch[2]
+            told[p, ERROR], told[p, WORK] = error, work[0]
+            if not error <= goal:
                 break
-            told[p, CHANGED] = 1.0
-            x[:] = kept[a:b]
+            while True:
+                found, worst, contact, hidden, changed = assess(
+                    s.indptr, s.indices, s.data, s.q, s.kind, s.parameters, s.rho, x,
+                    floor[a:b], u[a:b], kept[a:b], status[a:b], sliding[a:b],
+                )  # fmt: skip
+                told[p, WORST], told[p, CONTACT], told[p, HIDDEN] = worst, contact, hidden
+                if told[p, CHANGED] > 0.0:
+                    error = told[p, ERROR] = found
+                if not changed or not error <= goal:
+                    break
+                told[p, CHANGED] = 1.0
+                x[:] = kept[a:b]
+            if not worst > weakest[p] or left <= 0 or error == 0.0:
+                break
+            goal = min(error * TIGHTER * weakest[p] / worst, TIGHTER * goal)
 
 
 def _joined(arrays: Sequence[NDArray]) -> NDArray:
@@ -110,6 +134,7 @@ class Together:
     problems: Sequence[FrictionProblem]
     tolerance: float
     r: Array  # starts, then reactions, (contacts, 3)
+    weakest: float = math.inf  # error of a contact from which those that are `brief` go on
 
     def __post_init__(self) -> None:
         problems = self.problems
@@ -119,6 +144,9 @@ class Together:
             ends.append((ends[-1][0] + contacts, ends[-1][1] + blocks))
             limits.append(sweeps_of_first_chunks(blocks, contacts))
         self.sizes, self.limits = np.array(ends, np.int64), np.array(limits, np.int64)
+        self.beyond = np.array(
+            [self.weakest if is_brief(p, self.tolerance) else math.inf for p in problems]
+        )
         self.norms = np.array([p.q_norm for p in problems])
         kernels = [(*p.kernel_data, p.blocks.diagonal, p.blocks.eliminated) for p in problems]
         if len(kernels) == 1:
@@ -136,8 +164,9 @@ class Together:
     def solve(self, first: int, last: int) -> None:
         """Solve some of the problems."""
         solve_range(
-            first, last, self.sizes, self.limits, self.tolerance * self.norms, self.data,
-            self.floor, self.r, self.u, self.kept, self.status, self.sliding, self.told,
+            first, last, self.sizes, self.limits, self.tolerance * self.norms, self.beyond,
+            self.data, self.floor, self.r, self.u, self.kept, self.status, self.sliding,
+            self.told,
         )  # fmt: skip
 
     def flops(self, p: int) -> float:
