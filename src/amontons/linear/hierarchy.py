@@ -295,6 +295,19 @@ class Hierarchy:
         level.P.add(below.x, x)
         A.smooth(b, x, level.free, True)
 
+    def improve(self, k: int, b: Array, x: Array) -> None:
+        """The same cycle from x instead of zero."""
+        level = self.levels[k]
+        if level.P is None:  # x is exact
+            return
+        r, below = level.work.r, self.levels[k + 1].work
+        level.A.smooth(b, x, level.free, False)
+        level.A.residual(x, b, r)
+        level.P.restrict(r, below.b)
+        self.cycle(k + 1, below.b, below.x)
+        level.P.add(below.x, x)
+        level.A.smooth(b, x, level.free, True)
+
 
 def append_aggregates(levels: list[Level], aggregates: Aggregates) -> None:
     """Add all algebraic levels, until few aggregates are left or nothing more joins."""
