@@ -36,6 +36,7 @@ from typing import ClassVar
 import numpy as np
 from numpy.typing import NDArray
 
+from ...core.arrays import read_only
 from ...core.errors import UnsupportedForm
 from ...core.options import check_options
 from ...linear.hierarchy import Hierarchy
@@ -120,7 +121,7 @@ class ContactMultigrid:
                 continue
             iterate = Iterate(
                 run.contacts.r[:, : problem.dimension].copy(),
-                levels.displacement(x),
+                read_only(levels.displacement(x)),
                 iterations=since,
                 linear_iterations=since,
                 stage="contact multigrid",
@@ -284,8 +285,7 @@ class _Run:
         else:
             coarse = self.tangent.levels[self.k + 1].work
             P.restrict(self.r, coarse.b)
-            self.tangent.cycle(self.k + 1, coarse.b, coarse.x)
-            self.tangent.improve(self.k + 1, coarse.b, coarse.x)
+            self.tangent.cycle(self.k + 1, coarse.b, coarse.x, twice=True)
             P.add(coarse.x, x)
         contacts.limit(V, before, x)
 
