@@ -60,7 +60,7 @@ MANY = 0.1  # share of contacts that change their state above which mixing begin
 GROWTH = 1e3  # of the error over the best one that counts as divergence
 GRID_DEPTH = 2  # past cycles to mix at most where M is not stored
 SLOW = 0.8  # fall of the error in a cycle above which, while states change, steps are limited
-CLOSE = 0.9  # share of the error that should do at which an iterate is handed out
+CLOSE = 0.99  # share of the error that should do at which an iterate is handed out
 
 
 @dataclass(frozen=True)
@@ -77,7 +77,7 @@ class ContactMultigrid:
     depth: int = 8
     nested: bool = True
     coarse_tolerance: float = 1e-2
-    update_ratio: float = 0.03
+    update_ratio: float = 0.003
     contact_sweeps: int = 1  # over the contact nodes after each sweep in the bulk
     patience: int = 30  # cycles without halving the error before it gives up
     report: int = 10  # cycles between iterates that are not yet good enough
