@@ -29,6 +29,7 @@ three-dimensional contact problems with Coulomb friction", SIAM J. Sci. Comput. 
 
 from __future__ import annotations
 
+import itertools
 from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import ClassVar
@@ -42,6 +43,7 @@ from ...core.options import check_options
 from ...linear.hierarchy import Hierarchy
 from ...linear.vectors import add_scaled, copy_into, dot, norm
 from ...problem.friction import Form, FrictionProblem
+from ..anderson import Anderson
 from ..contract import (
     Breakdown,
     Iterate,
@@ -58,6 +60,8 @@ from .nodes import ContactNodes
 Array = NDArray[np.float64]
 MANY = 0.1  # share of contacts that change their state above which mixing begins anew
 GROWTH = 1e3  # of the error over the best one that counts as divergence
+LATE = 30  # cycles after which steps are mixed: residuals hide slow errors in soft parts
+LONG = 24  # steps to mix then
 GRID_DEPTH = 2  # past cycles to mix at most where M is not stored
 SLOW = 0.8  # fall of the error in a cycle above which, while states change, steps are limited
 CLOSE = 0.99  # share of the error that should do at which an iterate is handed out
@@ -90,9 +94,7 @@ class ContactMultigrid:
         )
         check_positive(coarse_tolerance=self.coarse_tolerance, update_ratio=self.update_ratio)
 
-    def iterates(
-        self, problem: FrictionProblem, start: Iterate, target: Target
-    ) -> Iterates:
+    def iterates(self, problem: FrictionProblem, start: Iterate, target: Target) -> Iterates:
         """States of the finest level, when they seem good enough and every `report` cycles."""
         if problem.form is not Form.GLOBAL:
             raise UnsupportedForm("ContactMultigrid: the problem has no global form")
@@ -189,10 +191,15 @@ class _Run:
         depth = self.options.depth
         if not self.level.A.is_stored:  # then cycles are as cheap as the mixing
             depth = min(depth, GRID_DEPTH)
-        mixing = LeastResidual(x.size, depth)
+        mixing, long, before = LeastResidual(x.size, depth), None, x
         best = at_update = last = np.inf
         patience = Patience(self.options.patience)
-        while True:
+        for count in itertools.count():
+            if count == LATE and depth:
+                long = Anderson(x.size, LONG if self.level.A.is_stored else depth)
+                before = np.empty_like(x)
+            if long is not None:
+                copy_into(x, before)
             self.smooth(x, backward=False)
             for _ in range(self.options.contact_sweeps):
                 self.contacts.relax(self.f, x, self.held, backward=False)
@@ -201,7 +208,7 @@ class _Run:
             unsettled = self.changed() > MANY * len(self.contacts.node)
             if unsettled:
                 mixing.forget()
-            if error > self.goal:
+            if error > self.goal and long is None:
                 error = self.accelerate(x, error, mixing)
             yield error
             if not np.isfinite(error) or error > GROWTH * best:
@@ -218,6 +225,10 @@ class _Run:
             (self.correct_carefully if careful else self.correct)(x)
             self.contacts.relax(self.f, x, self.held, backward=True)
             self.smooth(x, backward=True)
+            if long is not None:
+                if unsettled:
+                    long.forget()
+                long.mix(before.reshape(-1), x.reshape(-1))
 
     def changed(self) -> int:
         """Number of contacts in another state than in the tangent."""
