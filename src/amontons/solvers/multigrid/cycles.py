@@ -3,14 +3,22 @@
 One cycle, from v on the finest level:
 
 1. smooth: block Gauss-Seidel in the bulk, then every contact node solves its own problem of
-   contact and friction exactly (`nodes`); states, reactions and residual are of this v.
-2. coarse correction: one linear V(1,1) cycle on coarse levels that see these states, a Galerkin
-   tangent whose test and trial spaces are truncated to the directions in which the contacts can
-   move (`truncation`).  It is renewed when a state changes or the error has fallen far.
-3. smooth in reverse order.
-4. Anderson acceleration over a few cycles; forgotten when many states change.
+   contact and friction exactly (`nodes`), once before and once after the nodes that it touches
+   have been swept again.  In one-sided bases these couple strongly with the contacts, and so
+   does the master side: without that sweep cycles doubled with every refinement.
+2. mix: of this point and the last ones, the one with the least residual (`least_residual`);
+   contacts solve again, and states, reactions and residual are of this v.
+3. coarse correction: one linear V(1,1) cycle, with two on the second coarse level, on levels
+   that see these states, a Galerkin tangent whose test and trial spaces are truncated to the
+   directions in which the contacts can move (`truncation`).  It is renewed when a state changes
+   or the error has fallen far.
+4. smooth in reverse order.
 
-While many states change and the error hardly falls, step 2 is that of the convex problem with
+Residuals say little of what moves slowly in soft parts between stiff ones: after LATE cycles
+whole steps are mixed instead (`anderson`), between 4 and 1 and with a longer memory.  What is
+mixed is forgotten when many states change.
+
+While many states change and the error hardly falls, step 3 is that of the convex problem with
 the present bounds of friction: nodes that it lets penetrate are lifted to the surface, and the
 step is taken as far as the energy of that problem falls.  This costs one more product.
 
@@ -196,6 +204,7 @@ class _Run:
         patience = Patience(self.options.patience)
         for count in itertools.count():
             if count == LATE and depth:
+                mixing = LeastResidual(x.size, 0)
                 long = Anderson(x.size, LONG if self.level.A.is_stored else depth)
                 before = np.empty_like(x)
             if long is not None:
