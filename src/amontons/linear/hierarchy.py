@@ -281,8 +281,11 @@ class Hierarchy:
             x = fine
         return x
 
-    def cycle(self, k: int, b: Array, x: Array) -> None:
-        """x = one V(1,1) cycle from zero on level k for A x = b; symmetric if A is."""
+    def cycle(self, k: int, b: Array, x: Array, *, twice: bool = False) -> None:
+        """x = one V(1,1) cycle from zero on level k for A x = b; symmetric if A is.
+
+        twice: with two cycles on the level below.
+        """
         level = self.levels[k]
         if level.P is None:
             x[:] = (self.coarse_inverse @ b.reshape(-1)).reshape(-1, 3)
@@ -292,8 +295,23 @@ class Hierarchy:
         A.first_smooth(b, x, r)
         level.P.restrict(r, below.b)
         self.cycle(k + 1, below.b, below.x)
+        if twice:
+            self.improve(k + 1, below.b, below.x)
         level.P.add(below.x, x)
         A.smooth(b, x, level.free, True)
+
+    def improve(self, k: int, b: Array, x: Array) -> None:
+        """The same cycle from x instead of zero."""
+        level = self.levels[k]
+        if level.P is None:  # x is exact
+            return
+        r, below = level.work.r, self.levels[k + 1].work
+        level.A.smooth(b, x, level.free, False)
+        level.A.residual(x, b, r)
+        level.P.restrict(r, below.b)
+        self.cycle(k + 1, below.b, below.x)
+        level.P.add(below.x, x)
+        level.A.smooth(b, x, level.free, True)
 
 
 def append_aggregates(levels: list[Level], aggregates: Aggregates) -> None:

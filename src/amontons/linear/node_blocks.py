@@ -136,8 +136,10 @@ class NodeBlocks:
 
     def dense(self) -> Array:
         """The whole matrix, (3 n, 3 n)."""
-        n = 3 * self.nodes
-        return sparse.bsr_array((self.data, self.indices, self.indptr), shape=(n, n)).toarray()
+        n = self.nodes
+        out = np.zeros((n, 3, n, 3))
+        out[np.repeat(np.arange(n), np.diff(self.indptr)), :, self.indices] = self.data
+        return out.reshape(3 * n, 3 * n)
 
     def times(self, x: Array, out: Array) -> None:
         """out = A x, both (nodes, 3)."""

@@ -13,7 +13,7 @@ from numba import uint64
 from numpy.typing import NDArray
 
 from ..core.compiled import njit
-from ..core.threads import over_stages
+from ..core.threads import over_rows, over_stages
 from .level_matrix import LevelMatrix
 from .node_blocks import (
     NodeBlocks,
@@ -21,6 +21,7 @@ from .node_blocks import (
     row_product,
     visited_product,
 )
+from .some_rows import relax, residual_rows, sweep_rows
 
 Array = NDArray[np.float64]
 Index = NDArray[np.int64]
@@ -84,6 +85,11 @@ class PatchedBlocks:
         over_stages(_first_sweep, chunks, work, *self._arrays, b, x, tell=True)
         over_stages(_rest, chunks, work, *self._arrays, x, r, tell=True)
 
+    def residual(self, x: Array, b: Array, out: Array) -> None:
+        """out = b - A x."""
+        A = self.base
+        over_rows(_residual, A.nodes, A.work, *self._arrays, x, b, out)
+
     def stored(self) -> NodeBlocks:
         """The whole matrix, copied."""
         data, inverse = self.base.data.copy(), self.base.inverse.copy()
@@ -120,18 +126,22 @@ class PatchedOperator:
         own = self.rows
         rows = own.node, own.indptr, own.indices, self.data, self.inverse, b, x, held, backward
         if backward:
-            _sweep_rows(*rows)
+            sweep_rows(*rows)
         self.base.smooth(b, x, self.own | held, backward)
         if not backward:
-            _sweep_rows(*rows)
+            sweep_rows(*rows)
 
     def first_smooth(self, b: Array, x: Array, r: Array) -> None:
         """The same forwards from x = 0, and r = b - A x."""
         x[:] = 0.0
-        own = self.rows
         self.smooth(b, x, np.zeros(self.nodes, dtype=bool), False)
-        self.base.residual(x, b, r)
-        _residual_rows(own.node, own.indptr, own.indices, self.data, x, b, r)
+        self.residual(x, b, r)
+
+    def residual(self, x: Array, b: Array, out: Array) -> None:
+        """out = b - A x."""
+        self.base.residual(x, b, out)
+        own = self.rows
+        residual_rows(own.node, own.indptr, own.indices, self.data, x, b, out)
 
     def stored(self) -> NodeBlocks:
         """The whole matrix."""
@@ -147,35 +157,6 @@ def patched(A: LevelMatrix, rows: Rows) -> PatchedBlocks | PatchedOperator:
 
 
 @njit(cache=True, error_model="numpy", nogil=True)
-def _sweep_rows(node, indptr, indices, data, inverse, b, x, held, backward):  # noqa: PLR0913
-    """A block Gauss-Seidel sweep over the nodes of some rows that are not held."""
-    for step in range(len(node)):
-        k = len(node) - 1 - step if backward else step
-        i = uint64(node[k])
-        if not held[i]:
-            s = row_product(indices, data, x, uint64(indptr[k]), uint64(indptr[k + 1]))
-            _relax(inverse[k], b, s, x, i)
-
-
-@njit(cache=True, error_model="numpy", nogil=True)
-def _residual_rows(node, indptr, indices, data, x, b, r):  # noqa: PLR0913
-    """r = b - A x in some rows."""
-    for k in range(len(node)):
-        i = uint64(node[k])
-        s = row_product(indices, data, x, uint64(indptr[k]), uint64(indptr[k + 1]))
-        r[i, 0], r[i, 1], r[i, 2] = b[i, 0] - s[0], b[i, 1] - s[1], b[i, 2] - s[2]
-
-
-@njit(cache=True, error_model="numpy", inline="always")
-def _relax(D, b, s, x, i):
-    """x_i += D (b_i - s)."""
-    r0, r1, r2 = b[i, 0] - s[0], b[i, 1] - s[1], b[i, 2] - s[2]
-    x[i, 0] += D[0, 0] * r0 + D[0, 1] * r1 + D[0, 2] * r2
-    x[i, 1] += D[1, 0] * r0 + D[1, 1] * r1 + D[1, 2] * r2
-    x[i, 2] += D[2, 0] * r0 + D[2, 1] * r1 + D[2, 2] * r2
-
-
-@njit(cache=True, error_model="numpy", nogil=True)
 def _sweep(begin, end, number, indptr, indices, data, inverse, own_ptr, own_indices, own_data,
            own_inverse, b, x, held, backward):  # noqa: PLR0913 # fmt: skip
     for step in range(end - begin):
@@ -185,11 +166,11 @@ def _sweep(begin, end, number, indptr, indices, data, inverse, own_ptr, own_indi
         k = number[i]
         if k < 0:
             s = row_product(indices, data, x, uint64(indptr[i]), uint64(indptr[i + 1]))
-            _relax(inverse[i], b, s, x, i)
+            relax(inverse[i], b, s, x, i)
         else:
             first, last = uint64(own_ptr[k]), uint64(own_ptr[k + 1])
             s = row_product(own_indices, own_data, x, first, last)
-            _relax(own_inverse[k], b, s, x, i)
+            relax(own_inverse[k], b, s, x, i)
 
 
 @njit(cache=True, error_model="numpy", nogil=True)
@@ -201,11 +182,11 @@ def _first_sweep(begin, end, number, indptr, indices, data, inverse, own_ptr, ow
         if k < 0:
             first, last = uint64(indptr[i]), uint64(indptr[i + 1])
             s = visited_product(indices, data, x, first, last, i, begin, end, odd)
-            _relax(inverse[i], b, s, x, i)
+            relax(inverse[i], b, s, x, i)
         else:
             first, last = uint64(own_ptr[k]), uint64(own_ptr[k + 1])
             s = visited_product(own_indices, own_data, x, first, last, i, begin, end, odd)
-            _relax(own_inverse[k], b, s, x, i)
+            relax(own_inverse[k], b, s, x, i)
 
 
 @njit(cache=True, error_model="numpy", nogil=True)
@@ -221,3 +202,17 @@ def _rest(begin, end, number, indptr, indices, data, inverse, own_ptr, own_indic
             first, last = uint64(own_ptr[k]), uint64(own_ptr[k + 1])
             s = later_product(own_indices, own_data, x, first, last, i, begin, end, odd)
         r[i, 0], r[i, 1], r[i, 2] = -s[0], -s[1], -s[2]
+
+
+@njit(cache=True, error_model="numpy", nogil=True)
+def _residual(begin, end, number, indptr, indices, data, inverse, own_ptr, own_indices,
+              own_data, own_inverse, x, b, r):  # noqa: PLR0913 # fmt: skip
+    """b - A x; the inverses are not read."""
+    for i in range(begin, end):
+        k = number[i]
+        if k < 0:
+            s = row_product(indices, data, x, uint64(indptr[i]), uint64(indptr[i + 1]))
+        else:
+            first, last = uint64(own_ptr[k]), uint64(own_ptr[k + 1])
+            s = row_product(own_indices, own_data, x, first, last)
+        r[i, 0], r[i, 1], r[i, 2] = b[i, 0] - s[0], b[i, 1] - s[1], b[i, 2] - s[2]

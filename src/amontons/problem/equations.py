@@ -206,7 +206,9 @@ class Equations(Matrices):
             return 0.0
         assert self.M is not None and self.H is not None and self.f is not None
         push = self.H @ r.ravel()
-        rest = float(np.linalg.norm(self.M @ v - push - self.f))
+        force = self.times_M(v) - push
+        force -= self.f
+        rest = float(np.linalg.norm(force))
         if not np.isfinite(rest):
             return np.inf
         load = self.load or float(np.linalg.norm(push))
@@ -390,7 +392,7 @@ class Equations(Matrices):
             return self.free_velocity
         assert self.f is not None and self.M is not None
         v = self.guess if self.guess is not None else np.zeros(self.unknowns)
-        rest = self.f - self.M @ v if self.guess is not None else self.f
+        rest = self.f - self.times_M(v) if self.guess is not None else self.f
         nodes = hierarchy.nodes
         v = v + nodes.gather(hierarchy.estimate(nodes.spread(rest), ESTIMATED // 9))
         return self.local_velocity(v)

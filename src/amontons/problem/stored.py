@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
+from ..core.arrays import read_only
 from ..core.errors import UnsupportedForm
 from ..linear.grid_matrix import GridMatrix
 from .matrices import OPERATORS, GlobalMatrices
@@ -84,6 +85,22 @@ class Matrices(Problem):
     def solve_M(self, b: Array) -> Array:
         """M^-1 b, b of shape (n,) or (n, k)."""
         return self.matrices.solve(b)
+
+    def times_M(self, v: Array) -> Array:
+        """M v, (n,), not to be written to; that of the last v that nobody can write is kept."""
+        for known, product in self._products:
+            if known is v and not v.flags.writeable:
+                return product
+        assert self.M is not None
+        product = read_only(self.M @ v)
+        if v.base is None and not v.flags.writeable:
+            self._products[:] = [(v, product)]
+        return product
+
+    @cached_property
+    def _products(self) -> list[tuple[Array, Array]]:
+        """The last v and M v, or nothing."""
+        return []
 
     @property
     def hierarchy(self) -> Hierarchy | None:

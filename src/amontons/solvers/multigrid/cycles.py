@@ -3,14 +3,22 @@
 One cycle, from v on the finest level:
 
 1. smooth: block Gauss-Seidel in the bulk, then every contact node solves its own problem of
-   contact and friction exactly (`nodes`); states, reactions and residual are of this v.
-2. coarse correction: one linear V(1,1) cycle on coarse levels that see these states, a Galerkin
-   tangent whose test and trial spaces are truncated to the directions in which the contacts can
-   move (`truncation`).  It is renewed when a state changes or the error has fallen far.
-3. smooth in reverse order.
-4. Anderson acceleration over a few cycles; forgotten when many states change.
+   contact and friction exactly (`nodes`), once before and once after the nodes that it touches
+   have been swept again.  In one-sided bases these couple strongly with the contacts, and so
+   does the master side: without that sweep cycles doubled with every refinement.
+2. mix: of this point and the last ones, the one with the least residual (`least_residual`);
+   contacts solve again, and states, reactions and residual are of this v.
+3. coarse correction: one linear V(1,1) cycle, with two on the second coarse level, on levels
+   that see these states, a Galerkin tangent whose test and trial spaces are truncated to the
+   directions in which the contacts can move (`truncation`).  It is renewed when a state changes
+   or the error has fallen far.
+4. smooth in reverse order.
 
-While many states change and the error hardly falls, step 2 is that of the convex problem with
+Residuals say little of what moves slowly in soft parts between stiff ones: after LATE cycles
+whole steps are mixed instead (`anderson`), between 4 and 1 and with a longer memory.  What is
+mixed is forgotten when many states change.
+
+While many states change and the error hardly falls, step 3 is that of the convex problem with
 the present bounds of friction: nodes that it lets penetrate are lifted to the surface, and the
 step is taken as far as the energy of that problem falls.  This costs one more product.
 
@@ -29,6 +37,7 @@ three-dimensional contact problems with Coulomb friction", SIAM J. Sci. Comput. 
 
 from __future__ import annotations
 
+import itertools
 from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import ClassVar
@@ -36,6 +45,7 @@ from typing import ClassVar
 import numpy as np
 from numpy.typing import NDArray
 
+from ...core.arrays import read_only
 from ...core.errors import UnsupportedForm
 from ...core.options import check_options
 from ...linear.hierarchy import Hierarchy
@@ -51,22 +61,25 @@ from ..contract import (
     check_at_least,
     check_positive,
 )
+from ..least_residual import LeastResidual
 from .levels import ContactLevels
 from .nodes import ContactNodes
 
 Array = NDArray[np.float64]
-MANY = 0.1  # share of contacts that change their state above which Anderson forgets
+MANY = 0.1  # share of contacts that change their state above which mixing begins anew
 GROWTH = 1e3  # of the error over the best one that counts as divergence
-GRID_DEPTH = 3  # past cycles to mix at most where M is not stored
+LATE = 30  # cycles after which steps are mixed: residuals hide slow errors in soft parts
+LONG = 24  # steps to mix then
+GRID_DEPTH = 2  # past cycles to mix at most where M is not stored
 SLOW = 0.8  # fall of the error in a cycle above which, while states change, steps are limited
-CLOSE = 0.9  # share of the error that should do at which an iterate is handed out
+CLOSE = 0.99  # share of the error that should do at which an iterate is handed out
 
 
 @dataclass(frozen=True)
 class ContactMultigrid:
     """Nonlinear multigrid for meshed bodies in contact, see the module.
 
-    depth: past cycles that Anderson acceleration combines, 0 for none.  update_ratio: the
+    depth: past cycles that are combined for the least residual, 0 for none.  update_ratio: the
     tangent is renewed at the latest when the error has fallen by this factor.  Raises Breakdown
     where contacts have no slave nodes of their own (`one_sided`) and where the cycles fail.
     """
@@ -76,7 +89,7 @@ class ContactMultigrid:
     depth: int = 8
     nested: bool = True
     coarse_tolerance: float = 1e-2
-    update_ratio: float = 0.03
+    update_ratio: float = 0.003
     contact_sweeps: int = 1  # over the contact nodes after each sweep in the bulk
     patience: int = 30  # cycles without halving the error before it gives up
     report: int = 10  # cycles between iterates that are not yet good enough
@@ -89,9 +102,7 @@ class ContactMultigrid:
         )
         check_positive(coarse_tolerance=self.coarse_tolerance, update_ratio=self.update_ratio)
 
-    def iterates(
-        self, problem: FrictionProblem, start: Iterate, target: Target
-    ) -> Iterates:
+    def iterates(self, problem: FrictionProblem, start: Iterate, target: Target) -> Iterates:
         """States of the finest level, when they seem good enough and every `report` cycles."""
         if problem.form is not Form.GLOBAL:
             raise UnsupportedForm("ContactMultigrid: the problem has no global form")
@@ -111,16 +122,16 @@ class ContactMultigrid:
         x = levels.start(problem, start)
         if self.nested and start.v is None:
             self._nested_start(levels, tangent, problem, x)
-        goal, own = CLOSE * target.tolerance, []
+        run.goal, own = CLOSE * target.tolerance, []
         for error in run.cycles(x):
             own.append(error)
             since = len(own)
-            ready = error <= goal
+            ready = error <= run.goal
             if not (ready or since >= self.report or target.deadline.passed):
                 continue
             iterate = Iterate(
                 run.contacts.r[:, : problem.dimension].copy(),
-                levels.displacement(x),
+                read_only(levels.displacement(x)),
                 iterations=since,
                 linear_iterations=since,
                 stage="contact multigrid",
@@ -129,7 +140,8 @@ class ContactMultigrid:
             judged, own = (yield iterate), []
             if ready:  # the error that would have been small enough
                 told = target.error(problem, iterate, judged)
-                goal = CLOSE * error * min(target.tolerance / told, 1.0) if told > 0 else 0.0
+                share = min(target.tolerance / told, 1.0) if told > 0 else 0.0
+                run.goal = CLOSE * error * share
 
     def _nested_start(
         self, levels: ContactLevels, tangent: Hierarchy, problem: FrictionProblem, x: Array
@@ -144,9 +156,10 @@ class ContactMultigrid:
                 levels.hierarchy.levels[k].P.add(correction, y)
             given = (contacts, f, *levels.coarse_scales(k, f, problem))
             run = _Run(levels, tangent, self, given, k)
+            run.goal = self.coarse_tolerance
             try:
                 for error in run.cycles(y):
-                    if error <= self.coarse_tolerance:
+                    if error <= run.goal:
                         break
             except Breakdown:  # a bad start is better than none
                 pass
@@ -178,6 +191,7 @@ class _Run:
         self.states = np.full_like(self.contacts.state, -2)  # of the tangent
         self.frozen = False  # are the bounds of friction, in the tangent?
         self.updates = 0
+        self.goal = 0.0  # error that will do
         self.r = np.empty_like(self.f)
 
     def cycles(self, x: Array) -> Iterator[float]:
@@ -185,44 +199,83 @@ class _Run:
         depth = self.options.depth
         if not self.level.A.is_stored:  # then cycles are as cheap as the mixing
             depth = min(depth, GRID_DEPTH)
-        mixing = Anderson(x.size, depth)
-        before = np.empty_like(x)
+        mixing, long, before = LeastResidual(x.size, depth), None, x
         best = at_update = last = np.inf
         patience = Patience(self.options.patience)
-        while True:
-            copy_into(x, before)
+        for count in itertools.count():
+            if count == LATE and depth:
+                mixing = LeastResidual(x.size, 0)
+                long = Anderson(x.size, LONG if self.level.A.is_stored else depth)
+                before = np.empty_like(x)
+            if long is not None:
+                copy_into(x, before)
             self.smooth(x, backward=False)
             for _ in range(self.options.contact_sweeps):
-                self.contacts.sweep(self.f, x)
-            changed = int(np.count_nonzero(self.contacts.state != self.states))
+                self.contacts.relax(self.f, x, self.held, backward=False)
+            self.level.A.residual(x, self.f, self.r)
             error = self.error(x)
+            unsettled = self.changed() > MANY * len(self.contacts.node)
+            if unsettled:
+                mixing.forget()
+            if error > self.goal and long is None:
+                error = self.accelerate(x, error, mixing)
             yield error
             if not np.isfinite(error) or error > GROWTH * best:
                 raise Breakdown("contact multigrid: the cycles diverge")
             best = min(best, error)
             if patience.over(error):
                 raise Breakdown("contact multigrid: the cycles have stalled")
-            unsettled = changed > MANY * len(self.contacts.node)
             careful = unsettled and error > SLOW * last
             last = error
             fallen = error < self.options.update_ratio * at_update
-            if changed or careful or self.frozen or fallen:
+            if self.changed() or careful or self.frozen or fallen:
                 self.renew(careful)
                 at_update = error
             (self.correct_carefully if careful else self.correct)(x)
-            self.contacts.sweep(self.f, x, backward=True)
+            self.contacts.relax(self.f, x, self.held, backward=True)
             self.smooth(x, backward=True)
-            if unsettled:
-                mixing.forget()
-            mixing.mix(before.reshape(-1), x.reshape(-1))
+            if long is not None:
+                if unsettled:
+                    long.forget()
+                long.mix(before.reshape(-1), x.reshape(-1))
+
+    def changed(self) -> int:
+        """Number of contacts in another state than in the tangent."""
+        return int(np.count_nonzero(self.contacts.state != self.states))
 
     def smooth(self, x: Array, backward: bool) -> None:
         """One sweep in the bulk."""
         self.level.A.smooth(self.f, x, self.held, backward)
 
+    def accelerate(self, x: Array, error: float, mixing: LeastResidual) -> float:
+        """x as the best of the last points, with its law kept; its error.
+
+        It stays as it was where its error would grow, and the memory begins anew.  The rows of
+        contacts in the residual that is made small are those of the tangent (`combine`).
+        """
+        contacts, node, r = self.contacts, self.contacts.node, self.r
+        raw, before, state = r[node], x[node], contacts.state.copy()
+        contacts.combine(contacts.tangent()[1], r)
+        if mixing.mix(x.reshape(-1), r.reshape(-1)):
+            contacts.sweep(self.f, x)
+            contacts.residual(self.f, x, r)
+            mixed = self.error(x)
+            if mixed <= error:
+                error = mixed
+            else:
+                mixing.undo(x.reshape(-1), r.reshape(-1))
+                mixing.forget()
+                x[node], contacts.state = before, state
+                contacts.residual(self.f, x, r)
+                self.error(x)
+            raw = r[node]
+            contacts.combine(contacts.tangent()[1], r)
+        mixing.keep(x.reshape(-1), r.reshape(-1))
+        r[node] = raw
+        return error
+
     def error(self, x: Array) -> float:
-        """The residual measure of `judge`, from the residual of x, which is kept."""
-        self.level.A.residual(x, self.f, self.r)
+        """The measure of `judge` from the residual of x; reactions become those of x."""
         law = self.contacts.natural_map(x, self.r)
         kept = self.r[self.contacts.node]
         self.r[self.contacts.node] = 0.0
@@ -252,7 +305,7 @@ class _Run:
         else:
             coarse = self.tangent.levels[self.k + 1].work
             P.restrict(self.r, coarse.b)
-            self.tangent.cycle(self.k + 1, coarse.b, coarse.x)
+            self.tangent.cycle(self.k + 1, coarse.b, coarse.x, twice=True)
             P.add(coarse.x, x)
         contacts.limit(V, before, x)
 

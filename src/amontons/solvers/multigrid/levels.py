@@ -69,18 +69,17 @@ class ContactLevels:
     def coarse_problems(
         self, problem: FrictionProblem, x: Array
     ) -> list[tuple[ContactNodes, Array]]:
-        """Contacts and load of the coarser levels for a correction of x, from the finer ones.
+        """Contacts and load of the coarser levels for a correction of x, that of the guess.
 
         Galerkin loads; gaps at the contacts that sit on coarse nodes; Tresca's bounds summed.
         """
         if not self.coarse:
             return []
         assert problem.w is not None and problem.f is not None
-        levels = self.hierarchy.levels
-        f = self.nodes.spread(self.basis.to_load(problem.f))
-        product = np.empty_like(f)
-        levels[0].A.times(x, product)
-        f -= product
+        levels, load = self.hierarchy.levels, problem.f
+        if problem.guess is not None:
+            load = load - problem.times_M(problem.guess)
+        f = self.nodes.spread(self.basis.to_load(load))
         w = spatial(problem.w) + np.einsum("kai,ka->ki", self.contacts.H, x[self.contacts.node])
         bound = np.zeros(levels[0].A.nodes)
         bound[self.contacts.node] = problem.law.parameters[:, BOUND]

@@ -39,6 +39,7 @@ from ...core.compiled import njit
 from ...linear.hierarchy import Nodes
 from ...linear.level_matrix import LevelMatrix
 from ...linear.node_blocks import row_product
+from ...linear.some_rows import SomeRows, residual_rows
 from ...problem.judge.measures import contact_residual
 from ...problem.law import Kind, Law, Tied, Tresca
 from ...problem.law.law import BOUND, MU, TRESCA, columns_of, given
@@ -60,8 +61,9 @@ class ContactNodes:
     """Contacts at nodes: node (nc,), H (nc, 3, 3), w (nc, 3), and their law.
 
     inverse, compliance, to_reaction (nc, 3, 3): A_pp^-1, H^T A_pp^-1 H and H^-1; rho (nc,): of
-    the judge; rows: indptr, columns and blocks of their rows of the matrix.  State of the
-    iteration: r, u (nc, 3), and state (nc,) of the last local solves.
+    the judge; rows: indptr, columns and blocks of their rows of the matrix; near: those of the
+    nodes that they touch.  State of the iteration: r, u (nc, 3), and state (nc,) of the last
+    local solves.
     """
 
     node: Index
@@ -71,6 +73,7 @@ class ContactNodes:
     to_reaction: Array
     rho: Array
     rows: tuple[NDArray[np.int32], NDArray[np.int32], Array]
+    near: SomeRows
     w: Array = field(default_factory=lambda: np.zeros((0, 3)))
     law: Law = field(default_factory=lambda: Tresca(np.zeros(0)))
     driven: NDArray[np.bool_] = field(default_factory=lambda: np.zeros((0, 3), dtype=bool))
@@ -92,8 +95,9 @@ class ContactNodes:
         k, i = np.nonzero(np.abs(H).max(axis=1, initial=0.0) == 0)  # the second tangent in 2D
         compliance[k, i, i] = 1.0
         back: Any = np.linalg.pinv(H)
+        near = SomeRows.of(A, np.setdiff1d(rows.indices, node).astype(np.int64))
         return cls(node, H, inverse, compliance, back, 1 / size,
-                   (rows.indptr, rows.indices, rows.data))  # fmt: skip
+                   (rows.indptr, rows.indices, rows.data), near)  # fmt: skip
 
     def at(
         self, chosen: NDArray[np.bool_], node: Index, A: LevelMatrix
@@ -135,6 +139,22 @@ class ContactNodes:
             self.w, self.law.kind, self.law.parameters, f, x, self.r, self.u, self.state,
             backward,
         )  # fmt: skip
+
+    def relax(self, f: Array, x: Array, held: NDArray[np.bool_], backward: bool) -> None:
+        """`sweep`, a sweep over the nodes that contacts touch, and `sweep` again.
+
+        held (nodes,): the contact nodes.  What the first sweep leaves there would be all that
+        the next level sees of the bulk: most of the residual where such rows are strongly
+        coupled, as those of the nodes of a master surface are in the one-sided basis.
+        """
+        self.sweep(f, x, backward)
+        self.near.smooth(f, x, held, backward)
+        self.sweep(f, x, backward)
+
+    def residual(self, f: Array, x: Array, out: Array) -> None:
+        """out = f - A x in all rows that a sweep over the contacts changes."""
+        residual_rows(self.node, *self.rows, x, f, out)
+        self.near.residual(x, f, out)
 
     def natural_map(self, x: Array, residual: Array) -> float:
         """|natural map / rho|, unit of u, with r from the residual f - A x of the nodes.

@@ -1,0 +1,74 @@
+"""Some rows of a matrix on their own: relaxed and evaluated without a pass over the others."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numba import uint64
+from numpy.typing import NDArray
+
+from ..core.compiled import njit
+from .level_matrix import LevelMatrix
+from .node_blocks import row_product
+
+Array = NDArray[np.float64]
+Index = NDArray[np.int64]
+
+
+@dataclass(frozen=True, eq=False)
+class SomeRows:
+    """Rows of nodes (k,) in ascending order: indptr (k + 1,), indices (e,), data (e, 3, 3).
+
+    inverse (k, 3, 3): of the diagonal blocks.
+    """
+
+    node: Index
+    indptr: NDArray[np.int32]
+    indices: NDArray[np.int32]
+    data: Array
+    inverse: Array
+
+    @classmethod
+    def of(cls, A: LevelMatrix, node: Index) -> SomeRows:
+        """Copies of the rows of nodes (k,), ascending."""
+        rows = A.rows(node)
+        return cls(node, rows.indptr, rows.indices, rows.data, rows.inverse)
+
+    def smooth(self, b: Array, x: Array, held: NDArray[np.bool_], backward: bool) -> None:
+        """A block Gauss-Seidel sweep on A x = b over those of the nodes that are not held."""
+        sweep_rows(self.node, self.indptr, self.indices, self.data, self.inverse, b, x, held,
+                   backward)  # fmt: skip
+
+    def residual(self, x: Array, b: Array, out: Array) -> None:
+        """out = b - A x in these rows."""
+        residual_rows(self.node, self.indptr, self.indices, self.data, x, b, out)
+
+
+@njit(cache=True, error_model="numpy", inline="always")
+def relax(D, b, s, x, i):
+    """x_i += D (b_i - s)."""
+    r0, r1, r2 = b[i, 0] - s[0], b[i, 1] - s[1], b[i, 2] - s[2]
+    x[i, 0] += D[0, 0] * r0 + D[0, 1] * r1 + D[0, 2] * r2
+    x[i, 1] += D[1, 0] * r0 + D[1, 1] * r1 + D[1, 2] * r2
+    x[i, 2] += D[2, 0] * r0 + D[2, 1] * r1 + D[2, 2] * r2
+
+
+@njit(cache=True, error_model="numpy", nogil=True)
+def sweep_rows(node, indptr, indices, data, inverse, b, x, held, backward):  # noqa: PLR0913
+    """A block Gauss-Seidel sweep over the nodes of some rows that are not held."""
+    for step in range(len(node)):
+        k = len(node) - 1 - step if backward else step
+        i = uint64(node[k])
+        if not held[i]:
+            s = row_product(indices, data, x, uint64(indptr[k]), uint64(indptr[k + 1]))
+            relax(inverse[k], b, s, x, i)
+
+
+@njit(cache=True, error_model="numpy", nogil=True)
+def residual_rows(node, indptr, indices, data, x, b, r):  # noqa: PLR0913
+    """r = b - A x in some rows."""
+    for k in range(len(node)):
+        i = uint64(node[k])
+        s = row_product(indices, data, x, uint64(indptr[k]), uint64(indptr[k + 1]))
+        r[i, 0], r[i, 1], r[i, 2] = b[i, 0] - s[0], b[i, 1] - s[1], b[i, 2] - s[2]
