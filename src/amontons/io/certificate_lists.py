@@ -16,7 +16,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..analysis.solutions.enumerate import Solutions, enumerate_solutions
-from ..analysis.solutions.interval_search import Pieces, exclusions_between
+from ..analysis.solutions.interval_exclusions import exclusions_between
+from ..analysis.solutions.interval_search import Pieces
 from ..core.clock import Deadline
 from ..core.errors import InvalidInput
 from ..problem.friction import FrictionProblem

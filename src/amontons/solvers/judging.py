@@ -382,16 +382,9 @@ def finished(
         detail = "; ".join(part for part in (detail, text) if part)
     seconds = now() - watch.started
     record = Convergence(
-        outcome,
-        watch.iterations,
-        error,
-        watch.asked.tolerance,
-        tuple(watch.history),
-        watch.linear_iterations,
-        seconds,
-        watch.method,
-        Measure.NATURAL if natural else measure,
-        detail,
+        outcome, watch.iterations, error, watch.asked.tolerance, tuple(watch.history),
+        watch.linear_iterations, seconds, watch.method,
+        Measure.NATURAL if natural else measure, detail,
         contact_error=None if weakest is None else weakest.error,
         contact_tolerance=watch.asked.of_contacts,
         weakest=None if weakest is None else weakest.contact,
@@ -399,6 +392,6 @@ def finished(
         flops=watch.flops,
         stopped_by=watch.stopped_by,
         obstruction=found,
-    )
+    )  # fmt: skip
     settled = None if told is None else told.settled
     return FrictionSolution(of, r, u, v, record, settled=settled)

@@ -191,8 +191,7 @@ def proved_distance(
         return None  # a contact may react and move nothing of its own
     form = _Form(scaled, z0)
     limit = sigma * form.mu
-    eta = np.where(pinned[:, None], limit[:, None] * z0.t, eta)
-    eta = np.where(limit[:, None] > 0, eta, 0.0)
+    eta = np.where(pinned[:, None], limit[:, None] * z0.t, eta) * (limit[:, None] > 0)
     if not _sides_hold(z0, limit, tau, eta, pinned):
         return None
     W, k, d = form.W, *scaled.shape
@@ -210,18 +209,15 @@ def proved_distance(
         here = np.arange(k * d).reshape(k, d)
         M[here[:, :, None], here[:, None, :]] += held
         spread += (np.abs(held) @ scale.reshape(k, d, 1)).ravel()
-    M *= scale[:, None]
-    M *= scale
+    M *= scale[:, None] * scale
     rounding = gamma(4 * d + 40) * float((spread * scale).max()) * (1 + 1e-9)
     exact = not z0.off.any()
     least = 0.0 if exact else SHARE * smallest_eigenvalue(M)
     M[np.diag_indices(len(M))] -= least
     if not is_positive_definite(M, rounding / len(M)):
         return None
-    if exact:
-        return 0.0
-    if least <= 0:
-        return None
+    if exact or least <= 0:
+        return 0.0 if exact else None
     push = form.applied(tau, sigma, np.abs(eta), z0.off.reshape(-1, 1))[:, 0]
     reach = float(np.linalg.norm(scale * push)) / least * (1 + 1e-9)
     return reach * float(scale.max()) * (1 + 1e-9)

@@ -392,10 +392,5 @@ def run(**options: object) -> int:
     return run_case(**options)  # type: ignore[arg-type]
 
 
-main.add_command(audit)
-main.add_command(check)
-main.add_command(convert)
-main.add_command(examples)
-main.add_command(jam)
-main.add_command(collapse)
-main.add_command(modes)
+for command in (audit, check, convert, examples, jam, collapse, modes):
+    main.add_command(command)
