@@ -81,7 +81,7 @@ def solved(tmp_path_factory):
 def ran(tmp_path_factory):
     folder = tmp_path_factory.mktemp("ran")
     (folder / "case.toml").write_text(CASE)
-    arguments = ["run", folder / "case.toml", "-o", folder, "--every", 1, "--xdmf"]
+    arguments = ["run", folder / "case.toml", "-o", folder, "--every", 1, "--xdmf", "--rates"]
     done = CliRunner().invoke(main, list(map(str, arguments)))
     assert done.exit_code == 0, done.output
     return folder

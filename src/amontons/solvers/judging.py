@@ -39,7 +39,7 @@ NOT_HELD = ("M has no inverse, something moves without a strain: a mechanism, or
             "whose reduced integration feels no bending")  # fmt: skip
 CONTENT = 5  # iterates with which a solver is content before its goal is tightened: Newton is
 # there with one more, and keeps its history
-EARLY = 30  # iterates after which a problem that no method is made for is given up
+EARLY = 20  # iterates after which a problem that no method is made for is given up
 GAVE_UP = (Outcome.STAGNATED, Outcome.BREAKDOWN, Outcome.CYCLED, Outcome.NON_FINITE)
 
 

@@ -7,6 +7,7 @@ import pytest
 from scipy import integrate, optimize
 
 import amontons as am
+from amontons.linear.blocks import BlockRows
 from amontons.mechanics.multibody import (
     GROUND,
     Ball,
@@ -67,7 +68,7 @@ def test_w_is_h_inverse_mass_h():
     for b in range(6):
         M_inverse[3 * b : 3 * b + 3, 3 * b : 3 * b + 3] = np.eye(3) / masses[b]
         M_inverse[18 + 3 * b : 21 + 3 * b, 18 + 3 * b : 21 + 3 * b] = inverse[b]
-    W = delassus(rows, masses, inverse)
+    W = BlockRows(*delassus(rows, masses, inverse))
     dense = np.zeros((n, n))
     for i in range(n // 3):
         assert (np.diff(W.indices[W.indptr[i] : W.indptr[i + 1]]) > 0).all()

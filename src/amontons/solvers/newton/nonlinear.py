@@ -43,7 +43,7 @@ from ..contract import (
     check_at_least,
     check_positive,
 )
-from ..judging import first_of, sent
+from ..judging import EARLY, first_of, sent
 from .linear_steps import LOOSEST, LinearSteps, forcing
 from .states import Linear, PlainStates, States
 
@@ -218,7 +218,8 @@ class NonlinearNewton:
         tangent = whole if whole.law.varies else whole.plain  # with springs behind v
         start = Iterate(np.zeros((tangent.contacts, tangent.dimension)))
         try:
-            iterates = first_of(Auto().iterates(tangent, start, target), CONTACT_STEPS)
+            most = EARLY if tangent.gains_energy else CONTACT_STEPS
+            iterates = first_of(Auto().iterates(tangent, start, target), most)
             iterate = sent(iterates, None)
             while iterate is not None:
                 state = iterate.v if iterate.v is not None else tangent.velocity(iterate.r)[1]
