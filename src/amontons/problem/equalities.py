@@ -242,7 +242,7 @@ class LocalEqualities:
             full = through.toarray()
             taken = full @ full.T
             inner: Any = W - taken
-            inner[np.abs(inner) <= CANCELLED * (np.abs(W) + np.abs(taken))] = 0.0
+            inner[np.abs(inner) <= CANCELLED * (abs(W) + np.abs(taken))] = 0.0
         else:
             entries = float(np.square(np.diff(through.tocsc().indptr).astype(float)).sum())
             check_fits(12.0 * entries, 3, f"V R^-1 V^T of {len(q)} contacts")
