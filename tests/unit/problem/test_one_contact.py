@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 
+import amontons as am
 from amontons.problem.law import Coulomb, Tresca
 from amontons.problem.law.single import solve_contact, solve_one
 from amontons.problem.law.states import OPEN, SLIP, STICK
@@ -353,3 +354,18 @@ def test_the_oracle_counts_solutions_of_a_hand_made_contact():
     np.testing.assert_allclose(found[0], 0)
     np.testing.assert_allclose(found[1], [5 / 3, -7 / 3, 0], atol=1e-12)
     np.testing.assert_allclose(found[2], [1 / 3, -2 / 3, 0], atol=1e-9)
+
+
+@pytest.mark.parametrize("d", [2, 3])
+def test_what_rounding_leaves_of_a_singular_block_holds_nothing(d):
+    """W of rank 1: no reaction of 1e16 sticks there, the contact slips, or rests."""
+    random = np.random.default_rng(5)
+    for _ in range(300):
+        g = random.standard_normal(d)
+        W, mu = np.outer(g, g), random.uniform(0.2, 2.0)
+        r = np.append(1.0, random.standard_normal(d - 1))
+        r[1:] *= mu / np.linalg.norm(r[1:])  # slips against its reaction
+        u = np.append(0.0, -random.uniform(0.1, 1.0) * r[1:])
+        problem = am.FrictionProblem.from_delassus(W, (u - W @ r)[None], [mu])
+        solution = am.drive(problem, am.GaussSeidel(), tolerance=1e-10, max_iterations=200)
+        assert np.abs(solution.r).max() < 1e6

@@ -34,6 +34,7 @@ NEAR_STEPS = 8  # from the last direction of a sweep, before the careful search
 ANGLES = 16  # intervals of the circle searched when Newton fails: roots are at most four
 PROJECTIONS = 500  # of the last resort
 BISECTIONS = 55  # of such an interval: to the last bit
+CANCELLED = 1e-15  # of an entry of A: what may be left of it where A is singular
 ROUNDING = 1e-13  # relative size of what counts as zero at the edge between stick and slip
 
 
@@ -156,6 +157,11 @@ def solve_coulomb(A, b0, b1, b2, mu, g1, g2):  # noqa: PLR0913
     y1, y2 = b1 - k1 * b0, b2 - k2 * b0
     s11, s12 = A[1, 1] - k1 * A[0, 1], A[1, 2] - k1 * A[0, 2]
     s21, s22 = A[2, 1] - k2 * A[0, 1], A[2, 2] - k2 * A[0, 2]
+    if abs(s11) <= CANCELLED * abs(A[1, 1]) and abs(s22) <= CANCELLED * abs(A[2, 2]):
+        s11 = s12 = s21 = s22 = 0.0  # W of rank 1: what is left is rounding
+    elif s12 == 0.0 and s21 == 0.0:
+        s11 = 0.0 if abs(s11) <= CANCELLED * abs(A[1, 1]) else s11
+        s22 = 0.0 if abs(s22) <= CANCELLED * abs(A[2, 2]) else s22
     x1, x2, regular = _stick(s11, s12, s21, s22, y1, y2)
     x0 = -(b0 + A[0, 1] * x1 + A[0, 2] * x2) / a
     if regular and x0 > 0.0 and x1 * x1 + x2 * x2 <= mu * mu * x0 * x0:
