@@ -62,8 +62,9 @@ class LargeDeformation(NonlinearProblem):
     load, prescribed (dofs,): nodal forces, also as an array of dead ones, and values on the
     fixed dofs, zero on the free ones; before (dofs,): displacements of all nodes since which
     friction counts; drift (nc, d): motion added to that of the contacts since then; drawn
-    (nc, d-1): of springs, see `contact.framed_point`; known: load, prescribed values (dofs,)
-    and state v (n,) from which load steps may begin, the undeformed state where None.
+    (nc, d-1): of springs, see `contact.framed_point`; play (nc,): `contact.closing`; known:
+    load, prescribed values (dofs,) and state v (n,) from which load steps may begin, the
+    undeformed state where None.
     """
 
     parts: NonlinearParts
@@ -74,6 +75,7 @@ class LargeDeformation(NonlinearProblem):
     known: tuple[NodalForces | Array, Array, Array] | None = None
     name: str = ""
     drawn: Array | None = None
+    play: Array | None = None
     _last: list[Array] = field(default_factory=list, init=False, repr=False)  # of `_local`
 
     def __post_init__(self) -> None:
@@ -141,7 +143,8 @@ class LargeDeformation(NonlinearProblem):
         """
         motion, meeting = self._meeting(u)
         rest = balanced(self.parts, meeting, rest)
-        return self.parts.contact.at(rest[self.parts.at], motion, meeting, self.drawn), rest
+        known = rest[self.parts.at], motion, meeting, self.drawn, self.play
+        return self.parts.contact.at(*known), rest
 
     def _needed(self, u: Array, pressures: Array | None = None) -> Array:
         """f_int - f (dofs,) at displacements u (nodes, d), or at given pressures, too."""
@@ -210,14 +213,15 @@ class LargeDeformation(NonlinearProblem):
             u = self.displacement(v)
             motion, meeting = self._meeting(u)
             rest = balanced(self.parts, meeting, self._needed(u))
-            local = self.parts.contact.local(rest[self.parts.at], motion, meeting, self.drawn)
+            known = rest[self.parts.at], motion, meeting, self.drawn, self.play
+            local = self.parts.contact.local(*known)
             self._last[:] = v.copy(), *local, rest
         return tuple(part.copy() for part in self._last[1:])  # type: ignore[return-value]
 
     def local_velocity(self, v: Array) -> Array:
         """u = [gap, slip since the last step], (nc, d), in the frames at the state v."""
         s, meeting = self._meeting(self.displacement(v))
-        return self.parts.contact.local(0 * s, s, meeting, self.drawn)[1]
+        return self.parts.contact.local(0 * s, s, meeting, self.drawn, self.play)[1]
 
     def motion(self, r: Array, v: Array | None = None) -> tuple[Array, Array]:
         """([gap, slip], v) at the state v, without one at 0."""
