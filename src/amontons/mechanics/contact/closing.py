@@ -9,8 +9,7 @@ on like that, and until then slides by
 against no force.  Were that counted as slip, and so taken back by stick, the edge of contact
 where bodies roll onto each other would reach as far ahead of itself as contacts go in half a
 step, in the mean: forces of rolling have errors of first order in the step that way, with (1)
-of second order.  [VW] has the same of cells of a contact on a fixed grid, whose first point
-does not lie at the edge.
+of second order.  Compare [VW], for steady rolling on a fixed grid.
 
 (1) tells of the past, so that it bounds what is not counted and does not prescribe it: up to
 a, either way, a contact that closes has no friction, see `current`, and friction never acts
@@ -43,7 +42,7 @@ def slid_while_open(
     """a of (1), (nc,), a length; zero of contacts that touch or are far from it.
 
     earlier, now: where the pairs met at the beginning and the end of the last step, at
-    displacements before and u (nodes, d); open_ (nc,): contacts that are at its end;
+    displacements before and u (nodes, d); open_ (nc,): contacts open at its end;
     offset (nc,): of gaps, by the law; least: the gap that is none but rounding.
     """
     gap, closer = now.gap + offset, earlier.gap - now.gap

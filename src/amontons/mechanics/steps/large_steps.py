@@ -167,7 +167,7 @@ def slid_open(problem: LargeDeformation, state: State, duration: float) -> Array
         return None
     u = problem.before.reshape(parts.X.shape)
     apart = problem.earlier.gap + law.offset
-    open_ = state.force[:, 0] + law.cohesion < contact.rho * apart
+    open_ = (state.force[:, 0] + law.cohesion < contact.rho * apart) & ~law.tied
     found = slid_while_open(parts.meet(u - moved), problem.earlier, u - moved, u, open_,
                             law.offset, parts.resolved[1])  # fmt: skip
     return found if found.any() else None
