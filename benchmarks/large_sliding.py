@@ -49,10 +49,10 @@ PEERS = ("amontons, half steps", "amontons, fine", "amontons, law of CalculiX",
          "amontons, law of CalculiX, fine",
          "GetFEM", "GetFEM, half steps", "GetFEM, x 10", "GetFEM, x 100", "GetFEM, fine",
          "CalculiX", "CalculiX, exchanged", "CalculiX, x 10", "CalculiX, x 100",
-         "CalculiX, x 10, fine")  # fmt: skip
+         "CalculiX, fine", "CalculiX, x 10, fine")  # fmt: skip
 ALONE = ("ironing, second order", "ironing, beyond the rim", "turned, second order")
 ALL = CASES | MORE
-MESHES = {"fine": 2, "finer": 4}  # times as many cells
+MESHES = {"fine": 2, "finer": 4, "finest": 8}  # times as many cells
 STEPS = {"half steps": 2, "quarter steps": 4}  # parts of a load step
 THIRD = "third method"
 ROUND = ("pressed into a tube",)  # given to it by its meridian
@@ -60,13 +60,18 @@ MORE_RUNS = {  # where two programs differ: finer in mesh, load step and stiffne
     "rolling tyre": (
         "amontons, quarter steps", "amontons, fine, half steps",
         "amontons, fine, quarter steps", "amontons, fine, exchanged", "amontons, finer",
-        "GetFEM, fine, half steps", "GetFEM, fine, x 10", f"{THIRD}, half steps",
+        "GetFEM, fine, half steps", "GetFEM, fine, x 10", THIRD, f"{THIRD}, half steps",
         f"{THIRD}, half steps, x 3", f"{THIRD}, quarter steps",
         f"{THIRD}, fine, half steps",
     ),
+    "folded strip": (
+        "amontons, fine, half steps", THIRD, f"{THIRD}, fine", f"{THIRD}, fine, half steps",
+        f"{THIRD}, fine, x 3", f"{THIRD}, finer",
+    ),
     "pressed into a tube": (
-        "amontons, fine, exchanged", f"{THIRD}, fine", f"{THIRD}, fine, half steps",
-        f"{THIRD}, finer",
+        "amontons, fine, exchanged", "amontons, exchanged, half steps", "GetFEM, exchanged",
+        f"{THIRD}, fine", f"{THIRD}, fine, half steps", f"{THIRD}, finer",
+        f"{THIRD}, finer, half steps", f"{THIRD}, finer, x 3", f"{THIRD}, finest",
     ),
 }  # fmt: skip
 

@@ -133,10 +133,9 @@ def extrapolated(rows, name):
     limits = []
     for text, *runs in LIMITS.get(name, ()):
         meshes = [found.get(runs[0]), found.get(runs[-1])]
-        if len(runs) == 4:  # whole and half load steps on both meshes: an error of first order
+        if len(runs) == 4:  # whole and half load steps on both meshes
             pairs = [[found.get(program) for program in some] for some in (runs[:2], runs[2:])]
-            meshes = [None if one is None or two is None
-                      else 2 * two - one for one, two in pairs]  # fmt: skip
+            meshes = [limit_of(*pair) for pair in pairs]
         at_limit = limit_of(*meshes)
         if at_limit is not None:
             limits.append((text, runs, at_limit))
@@ -179,7 +178,7 @@ def written(rows, cases, programs):
              *table(["case", "program", "unknowns", "load steps", "means", "means apart",
                      "curves apart"], third), "",
              "Limits of zero width at an error of second order, with four runs those of zero "
-             "load steps at one of first order before, and how far their curves are from that "
+             "load steps before, of second order too, and how far their curves are from that "
              "of the third method.", "",
              *table(["case", "program", "from", "means", "apart"], limits), ""]  # fmt: skip
     notes = RESULTS / "large_sliding_notes.txt"

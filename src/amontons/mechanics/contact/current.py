@@ -15,6 +15,11 @@ c is a cohesion, C a compliance and o an offset of the law (`problem.law.changed
 Who meets nobody has no cohesion and no bound of his own.
 rho > 0 has the unit of force over length.  drift is (1 - gamma) V_T of [LR], else zero.
 
+Where a contact may have slid by a length a while it was open in this step, see `closing`, that
+much is no slip: z_T (1 - rho a / |z_T|), zero where negative, is in the place of z_T.  Then
+(2) is zero where friction opposes what is left of the motion, s_T (1 - a / |s_T|), and none is
+up to there: the proximal map of mu N max(|s_T| - a, 0) in the place of that of mu N |s_T|.
+
 Components that supports prescribe are left out: lambda and s count as zero there, the support
 takes them.  Orthotropic friction, and springs along the surface, are `framed_point`.
 
@@ -73,41 +78,48 @@ class CurrentContact:
         return Meetings([pair.at(positions) for pair in self.pairs])
 
     def local(
-        self, force: Array, motion: Array, meeting: Meetings, drawn: Array | None = None
-    ) -> tuple[Array, Array, Array]:
+        self, force: Array, motion: Array, meeting: Meetings, drawn: Array | None = None,
+        play: Array | None = None,
+    ) -> tuple[Array, Array, Array]:  # fmt: skip
         """(r, u, frames): reactions and [gap, slip], (nc, d), in the frames (nc, d, d) there.
 
         force lambda and motion s, (nc, d), in global axes; drawn (nc, d-1): how far springs
-        were drawn at the end of the last step, in the frames, a part of the slip.
+        were drawn at the end of the last step, in the frames, a part of the slip; play (nc,):
+        a, which is none.
         """
         axes = meeting.frames
         r = np.einsum("pkc,pc->pk", axes, force * self.free)
         u = np.einsum("pkc,pc->pk", axes, motion * self.free)
+        if play is not None:
+            z = r[:, 1:] - self.rho[:, None] * u[:, 1:]
+            u[:, 1:] += (1 - _left(z, self.rho * play))[:, None] * z / self.rho[:, None]
         u[:, 0] = meeting.gap
         if drawn is not None:
             u[:, 1:] += drawn
         return r, u, axes
 
     def at(
-        self, force: Array, motion: Array, meeting: Meetings, drawn: Array | None = None
-    ) -> ContactPoint:
+        self, force: Array, motion: Array, meeting: Meetings, drawn: Array | None = None,
+        play: Array | None = None,
+    ) -> ContactPoint:  # fmt: skip
         """The law at forces lambda and motions s, both (nc, d), where the pairs meet."""
         known = self, force * self.free, motion * self.free, meeting
         if not self.framed:
-            return ContactPoint(*known)
+            return ContactPoint(*known, play)
         from .framed_point import FramedPoint  # which is a ContactPoint
 
-        return FramedPoint(*known, drawn)
+        return FramedPoint(*known, None, drawn)
 
 
 @dataclass(frozen=True, eq=False)
 class ContactPoint:
-    """Where (2) is evaluated; arrays are made when they are asked for."""
+    """Where (2) is evaluated; arrays are made when they are asked for.  play (nc,): a."""
 
     contact: CurrentContact
     force: Array
     motion: Array
     meeting: Meetings
+    play: Array | None = None
 
     @property
     def n(self) -> Array:
@@ -172,9 +184,27 @@ class ContactPoint:
         return np.where(self.meeting.met, closed, -np.abs(along) - np.abs(apart))
 
     @cached_property
+    def _z(self) -> Array:
+        """z_T without a, (nc, d)."""
+        return self.y - self.n * self.y_normal[:, None]
+
+    @cached_property
     def z_tangent(self) -> Array:
         """z_T, (nc, d), in global axes."""
-        return self.y - self.n * self.y_normal[:, None]
+        if self.play is None:
+            return self._z
+        return _left(self._z, self.contact.rho * self.play)[:, None] * self._z
+
+    def _shortened(self, in_z: Array) -> Array:
+        """Derivatives by z_T (nc, d, d) as those by z_T without a."""
+        if self.play is None:
+            return in_z
+        left = _left(self._z, self.contact.rho * self.play)
+        size = np.linalg.norm(self._z, axis=1)
+        way = self._z / np.where(size > 0, size, 1.0)[:, None]
+        along = np.where(left > 0, 1 - left, 0.0)[:, None, None]
+        moved = left[:, None, None] * np.eye(len(self.n[0]))
+        return in_z @ (moved + along * way[:, :, None] * way[:, None, :])
 
     @cached_property
     def bound(self) -> Array:
@@ -287,6 +317,7 @@ class ContactPoint:
         eye = np.eye(d)
         tangential = eye - n[:, :, None] * n[:, None, :]
         in_z, in_bound = self._friction(pieces)
+        in_z = self._shortened(in_z)
         law, z = self.contact.law.plain, np.where(closed > 0, self.z_normal, 0.0)[:, None]
         slope = np.where(law.given(z), 0.0, law.parameters[:, MU])
         in_bound = in_bound * (slope * closed)[:, None]
@@ -342,6 +373,14 @@ class ContactPoint:
         sign = np.select([kind == SLIP, kind == BACK], [1.0, -1.0], 0.0)
         size = sign * self._bound((pieces > 0) & (pieces < 4))
         return -size[:, None, None] * self.n[:, :, None] * _tangents(self.n)[:, None, :]
+
+
+def _left(z: Array, short: Array) -> Array:
+    """1 - short / |z|, at least zero, (nc,), for z (nc, m): what is left of its length."""
+    size = np.linalg.norm(z, axis=1)
+    longer = size > short
+    left = np.where(longer, 1 - short / np.where(longer, size, 1.0), 0.0)
+    return np.where(short > 0, left, 1.0)
 
 
 def _slides(kind: Pieces) -> NDArray[np.bool_]:

@@ -61,9 +61,9 @@ class LargeDeformation(NonlinearProblem):
 
     load, prescribed (dofs,): nodal forces, also as an array of dead ones, and values on the
     fixed dofs, zero on the free ones; before (dofs,): displacements of all nodes since which
-    friction counts; drift (nc, d): motion added to that of the contacts since then; drawn
-    (nc, d-1): of springs, see `contact.framed_point`; known: load, prescribed values (dofs,)
-    and state v (n,) from which load steps may begin, the undeformed state where None.
+    friction counts; drift (nc, d): added to the motion of contacts since then; drawn
+    (nc, d-1): of springs, see `framed_point`; play (nc,): `contact.closing`; known: load,
+    prescribed (dofs,) and state v (n,) where load steps may begin; None: the undeformed one.
     """
 
     parts: NonlinearParts
@@ -74,6 +74,7 @@ class LargeDeformation(NonlinearProblem):
     known: tuple[NodalForces | Array, Array, Array] | None = None
     name: str = ""
     drawn: Array | None = None
+    play: Array | None = None
     _last: list[Array] = field(default_factory=list, init=False, repr=False)  # of `_local`
 
     def __post_init__(self) -> None:
@@ -131,17 +132,18 @@ class LargeDeformation(NonlinearProblem):
     def _meeting(self, u: Array) -> tuple[Array, Meetings]:
         """Motions of the contacts since the last step, (nc, d), and where they meet now."""
         meeting = self.parts.meet(u)
-        before = self.before.reshape(u.shape)
-        return meeting.motion(u, before, self.earlier) + self.drift, meeting
+        motion = meeting.motion(u, self.before.reshape(u.shape), self.earlier)
+        return motion + self.drift, meeting
 
     def _point(self, u: Array, rest: Array) -> tuple[ContactPoint, Array]:
         """The law at displacements u (nodes, d), where the bodies need `rest` (dofs,).
 
         And these without what contacts give to other nodes.
         """
-        motion, meeting = self._meeting(u)
+        (motion, meeting), contact = self._meeting(u), self.parts.contact
         rest = balanced(self.parts, meeting, rest)
-        return self.parts.contact.at(rest[self.parts.at], motion, meeting, self.drawn), rest
+        force = rest[self.parts.at]
+        return contact.at(force, motion, meeting, self.drawn, self.play), rest
 
     def _needed(self, u: Array, pressures: Array | None = None) -> Array:
         """f_int - f (dofs,) at displacements u (nodes, d), or at given pressures, too."""
@@ -207,17 +209,18 @@ class LargeDeformation(NonlinearProblem):
         The last state is kept: it is asked for its reactions, then for its error.
         """
         if not (self._last and np.array_equal(self._last[0], v)):
-            u = self.displacement(v)
+            u, contact = self.displacement(v), self.parts.contact
             motion, meeting = self._meeting(u)
             rest = balanced(self.parts, meeting, self._needed(u))
-            local = self.parts.contact.local(rest[self.parts.at], motion, meeting, self.drawn)
+            force = rest[self.parts.at]
+            local = contact.local(force, motion, meeting, self.drawn, self.play)
             self._last[:] = v.copy(), *local, rest
         return tuple(part.copy() for part in self._last[1:])  # type: ignore[return-value]
 
     def local_velocity(self, v: Array) -> Array:
         """u = [gap, slip since the last step], (nc, d), in the frames at the state v."""
         s, meeting = self._meeting(self.displacement(v))
-        return self.parts.contact.local(0 * s, s, meeting, self.drawn)[1]
+        return self.parts.contact.local(0 * s, s, meeting, self.drawn, self.play)[1]
 
     def motion(self, r: Array, v: Array | None = None) -> tuple[Array, Array]:
         """([gap, slip], v) at the state v, without one at 0."""
@@ -331,13 +334,10 @@ class LargeDeformation(NonlinearProblem):
     def closed_pieces(self, v: Array) -> list[Pieces]:
         """The active pieces with touching contacts stuck, then with all of them stuck."""
         point = self.contact_point(v)
-        size = np.ptp(self.parts.X, axis=0).max()
-        gap = point.meeting.gap
+        near = TOUCHING * np.ptp(self.parts.X, axis=0).max()
         loose = (point.pieces % 4 == 0) & point.meeting.met
-        return [
-            np.where(loose & (gap <= limit), STICK, point.pieces)
-            for limit in (TOUCHING * size, np.inf)
-        ]
+        return [np.where(loose & (point.meeting.gap <= limit), STICK, point.pieces)
+                for limit in (near, np.inf)]  # fmt: skip
 
     # ---------------------------------------------------------------- results
     def recover(self, r: Array, v: Array | None = None) -> tuple[Problem, Array, Array]:

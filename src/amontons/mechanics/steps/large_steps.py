@@ -15,6 +15,7 @@ from ...core.clock import NEVER, Deadline
 from ...problem.law import VaryingFriction
 from ...problem.law.law import MU
 from ...problem.solution import FrictionSolution
+from ..contact.closing import slid_while_open
 from ..contact.current_mortar import MortarMeeting
 from ..model import Model
 from ..model.diagnosis import with_diagnosis
@@ -66,6 +67,8 @@ class LargeSlowModel:
         body = body.divided(q0) if nonlinear_parts(body).folds else body
         drawn = self._drawn(state)
         problem = large_step(body, load, prescribed, q0, self._known(state), drawn)
+        if self.crossing is None:  # a kink beyond those that paths know
+            problem = replace(problem, play=slid_open(problem, state, time - state.time))
         if isinstance(problem.law, VaryingFriction):  # of the speed in this step
             problem = problem.with_law(problem.law.lasting(abs(time - state.time) or 1.0))
         arrive = None
@@ -149,6 +152,25 @@ class LargeSlowModel:
         pushed = meeting.pushed(meeting.frames, r)
         stored = Springs.of(self.motion.body.law, r.shape[1]).energy(r)
         return Forces(parts.forces(moved), load.at(moved), pushed, parts.energy(moved), stored)
+
+
+def slid_open(problem: LargeDeformation, state: State, duration: float) -> Array | None:
+    """How far contacts may slide in the step before they close, (nc,); None for none.
+
+    By the motion in the last step, scaled to the duration of this one.  Laws of the speed of
+    the slip take that of all of a step, those along tangents of the surface have no such law.
+    """
+    parts = problem.parts
+    contact, moved = parts.contact, (duration * state.velocity).reshape(parts.X.shape)
+    law = contact.law
+    if contact.framed or law.varies or not moved.any():
+        return None
+    u = problem.before.reshape(parts.X.shape)
+    apart = problem.earlier.gap + law.offset
+    open_ = (state.force[:, 0] + law.cohesion < contact.rho * apart) & ~law.tied
+    found = slid_while_open(parts.meet(u - moved), problem.earlier, u - moved, u, open_,
+                            law.offset, parts.resolved[1])  # fmt: skip
+    return found if found.any() else None
 
 
 def last_motion(problem: LargeDeformation, state: State, duration: float) -> Array:
