@@ -70,7 +70,8 @@ def _taking(types: Sequence[Any], found: Any) -> Any:
         return None
     described = copy(found.fndesc)  # by which other kernels call it
     described.argtypes = tuple(types)
-    return found._replace(signature=found.signature.replace(args=tuple(types)), fndesc=described)
+    signature = found.signature.replace(args=described.argtypes)
+    return found._replace(signature=signature, fndesc=described)
 
 
 def _record(function: Function, types: Sequence[Any]) -> None:

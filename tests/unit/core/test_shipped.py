@@ -134,7 +134,7 @@ def twice_the_sum(sums, factor, values):
 
 @pytest.fixture
 def shipped_as(monkeypatch, tmp_path):
-    """A kernel that comes with the package for such types alone, not compiled in this process."""
+    """A kernel that came with the package for such types alone."""
 
     def made(function, signature):
         compiled = numba.njit(function)
@@ -151,11 +151,11 @@ def shipped_as(monkeypatch, tmp_path):
     return made
 
 
-def compilations(call):
+def compilations(function, *arguments):
     """What a call returns, and how often it compiled something."""
     seen = []
     with telling(lambda: seen.append(1)):
-        return call(), len(seen)
+        return function(*arguments), len(seen)
 
 
 def test_arrays_open_for_writing_are_taken_by_a_kernel_that_only_reads(shipped_as):
@@ -163,23 +163,23 @@ def test_arrays_open_for_writing_are_taken_by_a_kernel_that_only_reads(shipped_a
     kernel = shipped_as(scaled_sum, (types.float64, locked))
     values = np.array([1.0, 2.5])
     for _ in range(2):
-        assert compilations(lambda: kernel(2.0, values)) == (7.0, 0)
+        assert compilations(kernel, 2.0, values) == (7.0, 0)
         values.flags.writeable = False
-        assert compilations(lambda: kernel(2.0, values)) == (7.0, 0)
+        assert compilations(kernel, 2.0, values) == (7.0, 0)
         values = values.copy()
-    assert compilations(lambda: kernel(2.0, values[::-1])) == (7.0, 1)  # another layout
+    assert compilations(kernel, 2.0, values[::-1]) == (7.0, 1)  # another layout
     outer = numba.njit(twice_the_sum)
     for _ in range(2):  # called by another kernel
-        assert compilations(lambda: outer(kernel, 2.0, values))[0] == 14.0
+        assert compilations(outer, kernel, 2.0, values)[0] == 14.0
         values.flags.writeable = False
 
 
 def test_locked_arrays_are_not_given_to_a_kernel_that_may_write(shipped_as):
     kernel = shipped_as(scaled_sum, SIGNATURE)
     values = np.array([1.0, 2.5])
-    assert compilations(lambda: kernel(2.0, values)) == (7.0, 0)
+    assert compilations(kernel, 2.0, values) == (7.0, 0)
     values.flags.writeable = False
-    assert compilations(lambda: kernel(2.0, values)) == (7.0, 1)
+    assert compilations(kernel, 2.0, values) == (7.0, 1)
 
 
 def test_an_array_that_is_handed_back_stays_open_for_writing(shipped_as):

@@ -60,7 +60,7 @@ def momenta(body, state):
     ((1.0, 0.6, 0.3), SOFT, 60),
 ])  # fmt: skip
 def test_a_free_block_that_spins_keeps_all(size, law, steps):
-    """Two turns and more of the first in steps of a third of a period of its first vibration."""
+    """In steps of a third of a period of its first vibration; the first makes two turns."""
     body = am.Body(am.box(size, 2), law)
 
     def velocity(x):
