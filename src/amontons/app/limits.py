@@ -8,8 +8,9 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import ArrayLike
 
+from ..core.arrays import number
 from ..core.clock import TimeLimit
-from ..core.errors import InvalidInput, UnsupportedForm
+from ..core.errors import InvalidInput, UnsupportedForm, shown
 from ..problem.friction import FrictionProblem
 from .api import checked
 
@@ -60,16 +61,19 @@ def collapse_load(
     from ..analysis.limits.collapse import collapse_load as bounds
 
     given = checked(problem)
-    if not 0 < gap < 1:
+    if not 0 < number("gap", gap) < 1:
         raise InvalidInput(f"gap: expected a number between 0 and 1, got {gap!r}")
     if isinstance(given, FrictionProblem):
-        return bounds(given, np.asarray(live, dtype=float), gap=gap, time_limit=time_limit)
+        return bounds(given, live, gap=gap, time_limit=time_limit)
     discrete, parts = _assembled(given, "collapse_load"), given.discretisation
-    if isinstance(live, np.ndarray):
-        raise InvalidInput("live: expected loads of the model, such as [BodyForce((1, 0))]")
+    from ..mechanics.model.parts import Load
     from ..mechanics.model.supports import external_load
 
-    loads: Any = list(live)  # type: ignore[arg-type]
+    loads: Any = live
+    if not isinstance(loads, list | tuple) or not all(isinstance(one, Load) for one in loads):
+        raise InvalidInput(
+            f"live: expected loads of the model, such as [BodyForce((1, 0))], got {shown(live)}"
+        )
     force = external_load(given.bodies, loads, parts.beside, own=False)
     return bounds(discrete, parts.gathered(force), gap=gap, time_limit=time_limit)
 

@@ -6,7 +6,9 @@ from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
+from scipy import sparse
 
+from ..core.arrays import expect_shape, finite, number, sparse_matrix
 from ..core.errors import InvalidInput, UnsupportedForm
 from ..problem.friction import FrictionProblem
 from ..problem.solution import FrictionSolution
@@ -17,6 +19,7 @@ if TYPE_CHECKING:
     from ..analysis.stability.modes import Modes
     from ..mechanics.model import Model
 
+ASYMMETRIC = 1e-9  # of the largest entry of a mass: what rounding may leave
 FAR = 1e4  # times the largest displacement: the way that a given sliding has gone
 
 
@@ -40,12 +43,16 @@ def modes(
     from ..analysis.stability.sliding import SlidingState
 
     if isinstance(target, FrictionSolution):
+        if velocity is not None:
+            raise InvalidInput("velocity: expected None, a discrete solution slides as it does")
         if mass is None:
             raise InvalidInput("mass: a discrete solution has none; expected (n, n)")
         if not target.problem.has_v:
             raise UnsupportedForm("modes: the problem is in its Delassus form; give M and H")
-        C = _rayleigh(mass, target.problem.M, mass_damping, stiffness_damping, damping)  # type: ignore[attr-defined]
-        return modes_of(SlidingState.of(Linearised.of(target), mass, C), count, near)
+        K: Any = target.problem.M  # type: ignore[attr-defined]
+        M = _symmetric("mass", mass, K.shape)
+        C = _rayleigh(M, K, mass_damping, stiffness_damping, damping)
+        return modes_of(SlidingState.of(Linearised.of(target), M, C), count, near)
     model = target.model if isinstance(target, ModelSolution) else target
     if not hasattr(model, "discrete_problem"):
         raise InvalidInput(
@@ -72,10 +79,30 @@ def modes(
 
 def _rayleigh(M: Any, K: Any, by_mass: float, by_stiffness: float, more: Any) -> Any:
     """C, None where nothing damps."""
+    by_mass = number("mass_damping", by_mass)
+    by_stiffness = number("stiffness_damping", by_stiffness)
     if not (by_mass or by_stiffness) and more is None:
         return None
     C = by_mass * M + by_stiffness * K
-    return C if more is None else C + more
+    return C if more is None else C + _matrix("damping", more, K.shape)
+
+
+def _matrix(name: str, given: Any, shape: tuple[int, int]) -> sparse.csc_array:
+    """A matrix of finite numbers, sparse or not, of the unknowns."""
+    found = sparse_matrix(name, given if sparse.issparse(given) else finite(name, given, 2))
+    expect_shape(name, found.shape, shape)
+    return found
+
+
+def _symmetric(name: str, given: Any, shape: tuple[int, int]) -> sparse.csc_array:
+    """The same, with kinetic energy for every motion along one unknown."""
+    found = _matrix(name, given, shape)
+    if abs(found - found.T).max() > ASYMMETRIC * abs(found).max():
+        raise InvalidInput(f"{name}: expected a symmetric matrix")
+    least = float(found.diagonal().min(initial=0.0))
+    if least < 0:
+        raise InvalidInput(f"{name}: expected none below zero on the diagonal, got {least:g}")
+    return found
 
 
 def _sliding(model: Model, velocity: Any) -> tuple[FrictionSolution, Any, float]:

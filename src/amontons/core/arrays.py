@@ -91,6 +91,13 @@ def number(name: str, value: object, *, least: float = -LARGEST) -> float:
     return float(found)
 
 
+def whole(name: str, value: object, *, least: int) -> int:
+    """One whole number from `least` on; truth values and floats are none."""
+    if not isinstance(value, int | np.integer) or isinstance(value, bool) or value < least:
+        raise InvalidInput(f"{name}: expected a whole number >= {least}, got {shown(value)}")
+    return int(value)
+
+
 def finite(name: str, values: object, dimensions: int) -> Array:
     """A read-only copy with so many dimensions, of finite numbers of any size."""
     array = real(name, values)
@@ -136,7 +143,10 @@ def contact_rows(name: str, values: ArrayLike, nc: int) -> Array:
     if array.ndim == 1 and nc and array.size in (2 * nc, 3 * nc):
         array = array.reshape(nc, -1)
     if array.ndim != 2 or array.shape[0] != nc or array.shape[1] not in (2, 3):
-        raise InvalidInput(f"{name}: expected shape ({nc}, 2) or ({nc}, 3), got {array.shape}")
+        raise InvalidInput(
+            f"{name}: expected shape ({nc}, 2) or ({nc}, 3), as friction is given for {nc} "
+            f"contacts, got {array.shape}"
+        )
     return squarable(name, array)
 
 

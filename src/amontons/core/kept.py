@@ -5,6 +5,7 @@ from __future__ import annotations
 import os
 from collections.abc import Callable, Sequence
 from contextlib import AbstractContextManager, suppress
+from copy import copy
 from functools import cached_property
 from typing import Any
 
@@ -42,7 +43,10 @@ class Kept(_Cache):
         types, _ = normalize_signature(sig)
         if RECORD and not clock.compiles():
             _record(self.function, types)
-        found = shipped().result(name_of(self.function, types), target_context)
+        name = name_of(self.function, types)
+        found = shipped().result(name, target_context)
+        if found is None and (other := shipped().that_writes_less(name)):
+            found = _taking(types, shipped().result(other, target_context))
         return self.own.load_overload(sig, target_context) if found is None else found
 
     def save_overload(self, sig: Any, data: Any) -> None:
@@ -54,6 +58,20 @@ class Kept(_Cache):
         """Numba's switch, of which nothing here makes use."""
 
     disable = flush = enable
+
+
+def _taking(types: Sequence[Any], found: Any) -> Any:
+    """A result for arrays that it only reads, as one for the same arrays open for writing.
+
+    To the machine code both are the same.  None where a result hands such an array back, as it
+    would be locked.
+    """
+    if found is None or "readonly" in str(found.signature.return_type):
+        return None
+    described = copy(found.fndesc)  # by which other kernels call it
+    described.argtypes = tuple(types)
+    signature = found.signature.replace(args=described.argtypes)
+    return found._replace(signature=signature, fndesc=described)
 
 
 def _record(function: Function, types: Sequence[Any]) -> None:

@@ -22,7 +22,8 @@ import logging
 import pickle
 import sys
 from collections.abc import Mapping, Sequence
-from functools import cache
+from functools import cache, cached_property
+from operator import ge
 from pathlib import Path
 from typing import Any
 
@@ -38,6 +39,7 @@ from .source_digest import PACKAGE, sources
 
 FILE = PACKAGE / "kernels.bin"
 START = b"amontons kernels"
+LOCK = "readonly "  # before the type of an array that may not be written, in numba's words
 logger = logging.getLogger(__name__)
 
 
@@ -70,6 +72,7 @@ class Shipped:
 
     def __init__(self, path: Path) -> None:
         self.path, self.names, self.base = path, {}, 0
+        self.loaded: dict[str, CompileResult] = {}
         try:
             head, self.base = _head(path)
             self.why_not = _misfit(head)
@@ -80,8 +83,26 @@ class Shipped:
         except (OSError, ValueError, KeyError, TypeError, AttributeError):
             self.why_not = "their file can not be read"
 
+    @cached_property
+    def unlocked(self) -> dict[str, list[str]]:
+        """Names of kernels by what they are called without the locks of arrays."""
+        found: dict[str, list[str]] = {}
+        for name in self.names:
+            found.setdefault(name.replace(LOCK, ""), []).append(name)
+        return found
+
+    def that_writes_less(self, name: str) -> str:
+        """A kernel like this that leaves more arrays as they are; empty where there is none."""
+        asked = _locks(name)
+        for other in self.unlocked.get(name.replace(LOCK, ""), ()):
+            if other in self.names and all(map(ge, _locks(other), asked)):
+                return other
+        return ""
+
     def result(self, name: str, target: Any) -> CompileResult | None:
         """The kernel of this name, ready to be called; None where there is none."""
+        if name in self.loaded:  # loading twice would define its symbols twice
+            return self.loaded[name]
         if name not in self.names:
             return None
         try:
@@ -92,11 +113,17 @@ class Shipped:
             if _digest(content) != digest:
                 raise ValueError("damaged")
             rtsys.initialize(target)  # all that loading needs of numba's (slow) `refresh`
-            return _unpacked(content, target)
+            self.loaded[name] = _unpacked(content, target)
+            return self.loaded[name]
         except Exception as error:  # what can be wrong is numba's, and compiling is the answer
             logger.warning("%s: %s: %s; it is compiled instead", self.path, name, error)
             self.names, self.why_not = {}, "their file is damaged"
             return None
+
+
+def _locks(name: str) -> list[bool]:
+    """Which of the arrays in a name are locked, one after the other."""
+    return [before.endswith(LOCK) for before in name.split("array(")[:-1]]
 
 
 @cache

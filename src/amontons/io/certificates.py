@@ -33,7 +33,7 @@ from ..analysis.scaled import COPIES
 from ..analysis.solutions.enumerate import Solutions
 from ..analysis.solutions.interval_search import pieces_between
 from ..core.clock import TimeLimit, deadline_of
-from ..core.errors import FileFormatError, InvalidInput
+from ..core.errors import FileFormatError, InvalidInput, shown
 from ..core.hdf5 import check_file
 from ..linear.dense import dense
 from ..problem.friction import FrictionProblem
@@ -77,8 +77,11 @@ def write_certificate(
         claim, arrays = "all solutions", all_solutions_of(local, verdict, deadline)
     elif isinstance(verdict, Diagram):
         claim, arrays = "all branches", _all_branches(local, verdict, end, deadline)
-    else:
+    elif isinstance(verdict, Uniqueness):
         claim, arrays = _one_solution(local, W, verdict, deadline)
+    else:
+        raise InvalidInput(f"verdict: expected an answer of `uniqueness`, `all_solutions` or "
+                           f"`diagram`, got {shown(verdict)}")  # fmt: skip
     data = {k: np.asarray(x) for k, x in {"W": W, "q": q, "mu": mu, **arrays}.items()}
     try:
         proves(claim, data)

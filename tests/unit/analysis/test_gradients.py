@@ -155,6 +155,10 @@ def test_what_can_not_be_differentiated_is_refused():
         s.vjp(r=np.zeros((2, 2)))
     with pytest.raises(am.InvalidInput, match="not finite"):
         s.jvp(load=np.full(q.shape, np.nan))
+    with pytest.raises(am.InvalidInput, match=r"W: expected shape \(6, 6\), got \(2, 2\)"):
+        s.jvp(W=np.eye(2))
+    with pytest.raises(am.InvalidInput, match="of_W.*: expected a finite number"):
+        s.vjp(r=np.zeros(q.shape)).of_W(np.full((6, 6), np.nan))
     with pytest.raises(am.InvalidInput, match="Delassus form"):
         s.vjp(v=np.zeros(6))
     with pytest.raises(am.UnsupportedForm, match="see of_M|without M"):

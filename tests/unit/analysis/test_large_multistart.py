@@ -55,7 +55,7 @@ def test_a_strip_between_two_bodies_buckles_to_either_side():
 
 
 def test_starts_and_time_are_limits():
-    with pytest.raises(am.InvalidInput, match="starts: expected at least 1"):
+    with pytest.raises(am.InvalidInput, match="starts: expected a whole number >= 1"):
         am.multistart(block(0.4), starts=0)
     found = am.multistart(block(0.4), starts=3)
     assert found.starts == 3

@@ -27,6 +27,7 @@ def wedge(degrees, material):
     )  # fmt: skip
 
 
+MODEL = wedge(20, am.Rigid(1.0))
 MATERIALS = {"rigid": am.Rigid(1.0), "elastic": am.LinearElastic(100, 0.3)}
 
 
@@ -125,6 +126,16 @@ def test_columns_overturn_or_slide(count, width, height, mu):
     assert found.lower < wanted and found.width < 0.01
 
 
+@pytest.mark.parametrize("weight", [1e-12, 1e9])
+def test_units_of_the_live_load_change_nothing(weight):
+    """A live load of one beside a dead load of a billion is less than programs keep to."""
+    problem, grows = column(1, 1, 2, 0.7)
+    heavy = replace(problem, f=problem.f * weight)
+    found = am.collapse_load(heavy, grows)
+    assert found.upper == pytest.approx(0.5 * weight, rel=1e-7)
+    assert found.width < 0.01
+
+
 def test_a_wall_of_blocks_is_bounded_on_both_sides():
     """Where both differ nothing is claimed in between; the frictionless wall can not stand."""
     wall = am.Wall(2, 2, (2.0, 1.0), (2, 1), am.LinearElastic(1, 0.3, density=1.0),
@@ -140,7 +151,16 @@ def test_a_wall_of_blocks_is_bounded_on_both_sides():
 
 def test_wrong_live_loads_are_refused():
     problem, _ = column(1, 1, 2, 0.7)
-    with pytest.raises(am.InvalidInput, match="live: expected 3 finite numbers"):
+    with pytest.raises(am.InvalidInput, match=r"live: expected shape \(3,\)"):
         am.collapse_load(problem, np.zeros(2))
+    with pytest.raises(am.InvalidInput, match=r"live.*: expected a finite number"):
+        am.collapse_load(problem, [np.nan, 0, 0])
+    with pytest.raises(am.InvalidInput, match="live: expected numbers"):
+        am.collapse_load(problem, "sideways")
+    with pytest.raises(am.InvalidInput, match="gap: expected a number"):
+        am.collapse_load(problem, np.ones(3), gap="narrow")
+    for loads in ([1, 0], am.BodyForce((1.0, 0.0)), None):
+        with pytest.raises(am.InvalidInput, match="live: expected loads of the model"):
+            am.collapse_load(MODEL, loads)
     with pytest.raises(am.InvalidInput, match="global form"):
         am.collapse_load(GALLERY["one-contact"](), np.zeros(2))

@@ -159,6 +159,16 @@ def test_what_has_no_modes_is_refused():
         am.modes(am.solve(problem), mass=np.eye(2))
     with pytest.raises(am.InvalidInput, match="mass"):
         am.modes(am.solve(problem))
+    found = am.solve(
+        am.FrictionProblem.from_global(np.eye(3), np.eye(3)[:, :2], [0, 1, 0], [[0, 0]], [0.3])
+    )
+    for name, wrong in (
+        ("mass", np.eye(2)), ("mass", np.full((3, 3), np.nan)), ("mass", -np.eye(3)),
+        ("mass", np.triu(np.ones((3, 3)))), ("damping", np.eye(2)), ("count", 1.5),
+        ("near", "a"), ("mass_damping", np.nan), ("velocity", (1, 0)),
+    ):  # fmt: skip
+        with pytest.raises(am.InvalidInput, match=f"{name}.*: expected"):
+            am.modes(found, **{"mass": np.eye(3), name: wrong})
     with pytest.raises(am.InvalidInput, match="expected a model or a solution"):
         am.modes(3)
     with pytest.raises(am.InvalidInput, match="along the surface"):

@@ -170,3 +170,9 @@ def test_many_contacts_are_searched_from_many_starts():
     assert {s.pattern for s in found.solutions} <= {"s" * 201}
     assert not found.complete
     assert "more than 200 contacts" in found.reason
+
+
+def test_starts_that_are_no_number_are_refused_by_name():
+    for name, wrong in (("starts", 0), ("starts", "many"), ("starts", 1.5), ("seed", -1)):
+        with pytest.raises(am.InvalidInput, match=f"{name}: expected a whole number"):
+            multistart(one_contact_2d(2.0), **{name: wrong})

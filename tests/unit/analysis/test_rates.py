@@ -235,8 +235,16 @@ def test_a_singular_W_leaves_it_undecided():
 def test_errors_say_what_is_wrong():
     problem, r, _ = state_of(0)
     for given in ((Found(r[:0]), None), (Found(r), r[:0])):
-        with pytest.raises(am.InvalidInput, match="expected reactions"):
+        with pytest.raises(am.InvalidInput, match="expected shape"):
             rates(problem, *given)
+    one = am.FrictionProblem.from_delassus(np.eye(2), [[-1.0, 0]], [0.3])
+    found = am.solve(one)
+    for given, match in (
+        ((one, None), "solution: expected a FrictionSolution"), ((None, found), "problem: exp"),
+        ((one, found, [1.0, 0.0]), "last"), ((one, found, [[np.nan, 0.0]]), "last.*finite"),
+    ):  # fmt: skip
+        with pytest.raises(am.InvalidInput, match=match):
+            rates(*given)
     tresca = am.FrictionProblem.from_delassus(np.eye(2), [[-1.0, 0]], am.Tresca([1.0]))
     with pytest.raises(am.UnsupportedLaw, match="expected Coulomb"):
         rates(tresca, am.solve(tresca))

@@ -44,3 +44,8 @@ def test_bad_input_is_named():
         am.maybe_others(failed)
     with pytest.raises(am.InvalidInput, match="starts: expected a whole number"):
         am.maybe_others(am.drive(problem), starts=0)
+    for wrong in (problem, None):
+        with pytest.raises(am.InvalidInput, match="solution: expected a converged solution"):
+            am.maybe_others(wrong)
+    with pytest.raises(am.InvalidInput, match="seed: expected a whole number >= 0, got 'x'"):
+        am.maybe_others(am.drive(problem), seed="x")

@@ -5,7 +5,9 @@ import os
 import shutil
 import subprocess
 import sys
+from contextlib import nullcontext
 from pathlib import Path
+from unittest.mock import Mock
 
 import numba
 import numpy as np
@@ -14,7 +16,7 @@ from numba import types
 from numba.core.registry import cpu_target
 
 import amontons
-from amontons.core import shipped
+from amontons.core import kept, shipped
 from amontons.core.clock import compiles
 from amontons.core.spelling import read, spelled
 from amontons.core.telling import telling
@@ -120,6 +122,69 @@ def test_damage_is_noticed_and_said(file, cut, caplog):
     assert found.result("it", cpu_target.target_context) is None
     assert "damaged" in caplog.text and "compiled instead" in caplog.text
     assert found.why_not == "their file is damaged"
+
+
+def itself(values):
+    return values
+
+
+def twice_the_sum(sums, factor, values):
+    return 2.0 * sums(factor, values)
+
+
+@pytest.fixture
+def shipped_as(monkeypatch, tmp_path):
+    """A kernel that came with the package for such types alone."""
+
+    def made(function, signature):
+        compiled = numba.njit(function)
+        compiled.compile(signature)
+        path, name = tmp_path / "kernels.bin", shipped.name_of(function, signature)
+        shipped.write(path, {name: shipped.packed(compiled.overloads[signature])}, [])
+        found = shipped.Shipped(path)
+        monkeypatch.setattr(kept, "shipped", lambda: found)
+        kernel = numba.njit(function)
+        kernel._cache = kept.Kept(function, nullcontext)
+        kernel._cache.own = Mock(load_overload=Mock(return_value=None))
+        return kernel
+
+    return made
+
+
+def compilations(function, *arguments):
+    """What a call returns, and how often it compiled something."""
+    seen = []
+    with telling(lambda: seen.append(1)):
+        return function(*arguments), len(seen)
+
+
+def test_arrays_open_for_writing_are_taken_by_a_kernel_that_only_reads(shipped_as):
+    locked = types.Array(types.float64, 1, "C", readonly=True)
+    kernel = shipped_as(scaled_sum, (types.float64, locked))
+    values = np.array([1.0, 2.5])
+    for _ in range(2):
+        assert compilations(kernel, 2.0, values) == (7.0, 0)
+        values.flags.writeable = False
+        assert compilations(kernel, 2.0, values) == (7.0, 0)
+        values = values.copy()
+    assert compilations(kernel, 2.0, values[::-1]) == (7.0, 1)  # another layout
+    outer = numba.njit(twice_the_sum)
+    for _ in range(2):  # called by another kernel
+        assert compilations(outer, kernel, 2.0, values)[0] == 14.0
+        values.flags.writeable = False
+
+
+def test_locked_arrays_are_not_given_to_a_kernel_that_may_write(shipped_as):
+    kernel = shipped_as(scaled_sum, SIGNATURE)
+    values = np.array([1.0, 2.5])
+    assert compilations(kernel, 2.0, values) == (7.0, 0)
+    values.flags.writeable = False
+    assert compilations(kernel, 2.0, values) == (7.0, 1)
+
+
+def test_an_array_that_is_handed_back_stays_open_for_writing(shipped_as):
+    kernel = shipped_as(itself, (types.Array(types.float64, 1, "C", readonly=True),))
+    assert kernel(np.ones(2)).flags.writeable
 
 
 def test_why_building_failed_is_known(tmp_path):

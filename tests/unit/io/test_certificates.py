@@ -47,6 +47,12 @@ def test_every_load_is_proved_and_more_friction_is_not(tmp_path, seed, d):
         am.check_certificate(path)
 
 
+def test_what_is_no_answer_is_refused(tmp_path):
+    with pytest.raises(InvalidInput, match="verdict: expected an answer of"):
+        am.write_certificate(hild_triangle(2).assemble(), 3, tmp_path / "c.h5")
+    assert not list(tmp_path.iterdir())
+
+
 def test_one_load_is_proved_also_on_several_branches(tmp_path):
     claims = set()
     for mu, branches in ((2.0, 1), (2.9, 2)):

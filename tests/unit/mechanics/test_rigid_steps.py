@@ -302,7 +302,9 @@ def test_an_arch_stands_on_both_sides_of_its_least_thickness(thickness, stands):
     [({"mu": -0.1}, "mu"), ({"restitution": 1.5}, "restitution"),
      ({"gravity": (0, 1)}, "gravity"), ({"joints": [Joint(0, 5, (0, 0, 0))]}, "joints"),
      ({"planes": [am.Plane((0, 1))]}, "planes"),
-     ({"apart": [(0, 0.5)]}, "apart"), ({"bodies": []}, "bodies"), ({"bodies": [1]}, "bodies")],
+     ({"apart": [(0, 0.5)]}, "apart"), ({"bodies": []}, "bodies"), ({"bodies": [1]}, "bodies"),
+     ({"bodies": RigidBody(Ball(1.0))}, "bodies: expected a list"), ({"apart": [3]}, "apart"),
+     ({"planes": am.Plane((0, 0, 1))}, "planes: expected a list"), ({"joints": [3]}, "joints")],
 )  # fmt: skip
 def test_bad_systems_are_refused_by_name(change, match):
     given = {"bodies": [RigidBody(Ball(1.0))], **change}
@@ -313,7 +315,8 @@ def test_bad_systems_are_refused_by_name(change, match):
 @pytest.mark.parametrize(
     ("options", "match"),
     [({"step": 0.0}, "step"), ({"until": -1.0}, "until"), ({"overlap": -1}, "overlap"),
-     ({"step": float("nan")}, "step")],
+     ({"step": float("nan")}, "step"), ({"until": "late"}, "until"), ({"start": 3}, "start"),
+     ({"tolerance": -1.0}, "tolerance")],
 )  # fmt: skip
 def test_bad_steps_are_refused_by_name(options, match):
     system = RigidBodies([RigidBody(Ball(1.0))])

@@ -40,8 +40,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from ...core.arrays import expect_shape, finite, number
 from ...core.clock import TimeLimit, deadline_of
-from ...core.errors import InvalidInput, UnsupportedLaw
+from ...core.errors import InvalidInput, UnsupportedLaw, shown
 from ...core.faces import Told
 from ...problem.friction import FrictionProblem
 from ...problem.law import Coulomb
@@ -120,14 +121,18 @@ def rates(
     UnsupportedLaw unless the law is Coulomb's, InvalidInput for a solution of another problem,
     SingularOperator where contact alone holds a body.
     """
+    if not isinstance(problem, FrictionProblem):
+        raise InvalidInput(f"problem: expected a FrictionProblem, got {shown(problem)}")
+    if not hasattr(solution, "r"):
+        raise InvalidInput(f"solution: expected a FrictionSolution, got {shown(solution)}")
     if not isinstance(problem.law, Coulomb):
         raise UnsupportedLaw(f"rates: expected Coulomb friction, got {problem.law.name}")
-    for name, r in (("solution", solution.r), ("last", last)):
-        if r is not None and r.shape != (problem.contacts, problem.dimension):
-            raise InvalidInput(
-                f"{name}: expected reactions {(problem.contacts, problem.dimension)}, got "
-                f"{r.shape}"
-            )
+    shape = problem.contacts, problem.dimension
+    expect_shape("solution", solution.r.shape, shape)
+    if last is not None:
+        last = finite("last", last, 2)
+        expect_shape("last", last.shape, shape)
+    number("tolerance", tolerance, least=0.0)
     scaled = Scaled.of(problem, deadline_of(time_limit, SECONDS))
     sets = _Sets.of(scaled, solution.r, last, tolerance)
     found = _eliminated(scaled, sets)

@@ -19,7 +19,7 @@ from ...core.faces import Told
 from ...core.warned import ResultWarning
 from ...problem.solution import FrictionSolution
 from .linearised import Linearised
-from .systems import System, rows, system_of
+from .systems import System, operator, rows, system_of
 
 Array = NDArray[np.float64]
 Index = NDArray[np.int64]
@@ -94,18 +94,20 @@ class Gradient(Told):
     def of_M(self, change: Any) -> float:
         """Derivative along a change of M, (n, n), a matrix or anything with @."""
         v = self._v
-        return float(-self.load @ (change @ v))
+        return float(-self.load @ (operator("of_M", change, (v.size, v.size)) @ v))
 
     def of_H(self, change: Any) -> float:
         """Derivative along a change of H, (n, nc d)."""
         v, r = self._v, self.solution.r.ravel()
+        change = operator("of_H", change, (v.size, r.size))
         return float(self.load @ (change @ r) + v @ (change @ self.w.ravel()))
 
     def of_W(self, change: Any) -> float:
         """Derivative along a change of W, (nc d, nc d)."""
         if self.solution.problem.has_v:
             raise UnsupportedForm("of_W: the problem is in its global form; see of_M and of_H")
-        return float(self.w.ravel() @ (change @ self.solution.r.ravel()))
+        r = self.solution.r.ravel()
+        return float(self.w.ravel() @ (operator("of_W", change, (r.size, r.size)) @ r))
 
     @property
     def _v(self) -> Array:
@@ -181,8 +183,9 @@ class Differentiable:
             if W is not None:
                 raise InvalidInput("W: the problem is in its global form; give M and H")
             if M is not None:
-                F = F - M @ solution.v
+                F = F - operator("M", M, (len(F), len(F))) @ solution.v
             if H is not None:
+                H = operator("H", H, (len(F), h.size))
                 F = F + H @ solution.r.ravel()
                 h = h + (H.T @ solution.v).reshape(shape)
         else:
@@ -190,6 +193,7 @@ class Differentiable:
                 raise InvalidInput("M, H: the problem is in its Delassus form; give W")
             h = h + rows("load", load, shape)
             if W is not None:
+                W = operator("W", W, (h.size, h.size))
                 h = h + (W @ solution.r.ravel()).reshape(shape)
         of_mu, of_bound = (rows(n, x, shape[:1]) for n, x in (("mu", mu), ("bound", bound)))
         c = -(self.at.by_mu * of_mu[:, None] + self.at.by_bound * of_bound[:, None])

@@ -43,6 +43,7 @@ from ...mechanics.steps.slow_model import SlowModel
 from ...problem.friction import FrictionProblem
 from .gradient import Differentiable, Gradient
 from .model_gradient import STENCIL, Make, numbers_of, of_bodies, step_of
+from .systems import rows
 
 Array = NDArray[np.float64]
 Slopes = Mapping[str, Any] | None
@@ -257,7 +258,7 @@ class _Adjoint:
             if name not in NAMES:
                 raise InvalidInput(f"slopes: expected {', '.join(NAMES)}, got {name!r}")
             if name == "force":
-                out[name] = np.asarray(value, dtype=float).reshape(self.parts.carried.shape)
+                out[name] = rows("slopes: force", value, self.parts.carried.shape)
             else:
                 out[name] = of_bodies(name, value, self.model)
         return out

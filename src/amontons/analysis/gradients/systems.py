@@ -24,6 +24,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import linalg, sparse
 
+from ...core.arrays import expect_shape, finite, sparse_matrix
 from ...core.errors import InvalidInput, SingularOperator
 from ...linear import Direct
 from ...linear.dense import DENSE_LIMIT
@@ -276,3 +277,13 @@ def rows(name: str, given: Any, shape: tuple[int, ...]) -> Array:
     if not np.isfinite(out).all():
         raise InvalidInput(f"{name}: holds a number that is not finite")
     return out
+
+
+def operator(name: str, given: Any, shape: tuple[int, int]) -> Any:
+    """A change of a matrix: an array, a sparse matrix, or what has a shape and @."""
+    if sparse.issparse(given) or not hasattr(given, "__matmul__"):
+        given = sparse_matrix(name, given) if sparse.issparse(given) else finite(name, given, 2)
+    elif isinstance(given, np.ndarray):
+        given = finite(name, given, 2)
+    expect_shape(name, getattr(given, "shape", shape), shape)
+    return given

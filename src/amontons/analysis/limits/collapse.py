@@ -34,6 +34,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import sparse
 
+from ...core.arrays import expect_shape, finite
 from ...core.clock import Deadline, deadline_of, now
 from ...core.errors import InvalidInput, UnsupportedLaw
 from ...core.faces import Told
@@ -94,7 +95,7 @@ class Collapse(Told):
 
 
 def collapse_load(
-    problem: FrictionProblem, live: Array, *, gap: float = GAP, time_limit: Any = None
+    problem: FrictionProblem, live: Any, *, gap: float = GAP, time_limit: Any = None
 ) -> Collapse:
     """Bounds on the factor of a live load, see the module.
 
@@ -107,11 +108,8 @@ def collapse_load(
         raise InvalidInput("collapse: expected the global form, M, H, f and w; this is W and q")
     if not isinstance(problem.law, Coulomb):
         raise UnsupportedLaw(f"collapse: expected Coulomb friction, got {problem.law.name}")
-    live = np.asarray(live, dtype=float)
-    if live.shape != (problem.unknowns,) or not np.isfinite(live).all():
-        raise InvalidInput(
-            f"live: expected {problem.unknowns} finite numbers, got shape {live.shape}"
-        )
+    live = finite("live", live, 1)
+    expect_shape("live", live.shape, (problem.unknowns,))
     began, deadline = now(), deadline_of(time_limit, WORK)
     blocks = _Blocks(problem, live)
     found = blocks.largest()
@@ -123,12 +121,16 @@ def collapse_load(
         return Collapse(0.0, np.inf, None, None, True, 1, now() - began,
                         "Any live load is balanced.")  # fmt: skip
     lower, reason = blocks.lower(upper, gap, deadline)
-    return Collapse(min(lower, upper), upper, r, motion, True, blocks.programs, now() - began,
-                    reason)  # fmt: skip
+    return Collapse(min(lower, upper) * blocks.factor, upper * blocks.factor, r, motion, True,
+                    blocks.programs, now() - began, reason)  # fmt: skip
 
 
 class _Blocks:
-    """The linear programs in r (nc, d) and x, of the balance of rigid motions."""
+    """The linear programs in r (nc, d) and x, of the balance of rigid motions.
+
+    Both loads have size one in them: else a live load much smaller than the dead one is less
+    than what programs keep to, and would seem to be balanced whatever its factor.
+    """
 
     def __init__(self, problem: FrictionProblem, live: Array) -> None:
         self.nc, self.d, self.mu = problem.contacts, problem.dimension, problem.mu
@@ -138,8 +140,9 @@ class _Blocks:
         G: Any = sparse.csr_array(modes.T @ H) if modes.shape[1] else H
         given: Any = problem.f, live
         dead, live = (modes.T @ x if modes.shape[1] else x for x in given)
-        self.size = float(max(np.abs(dead).max(initial=0), np.abs(live).max(initial=0))) or 1.0
-        self.G, self.dead, self.live = G, dead / self.size, live / self.size
+        self.size, unit = (float(np.abs(x).max(initial=0)) or 1.0 for x in (dead, live))
+        self.factor = self.size / unit  # of the live load, by one of which the programs count
+        self.G, self.dead, self.live = G, dead / self.size, live / unit
         self.programs = 0
         normal = np.arange(self.nc) * self.d
         self.normal = normal

@@ -22,8 +22,9 @@ from numpy.typing import NDArray
 from scipy import sparse
 from scipy.sparse.linalg import ArpackError, eigsh
 
+from ...core.arrays import whole
 from ...core.clock import Deadline, TimeLimit, deadline_of, now
-from ...core.errors import InvalidInput, InvertedCells, NotConverged, SingularOperator
+from ...core.errors import InvertedCells, NotConverged, SingularOperator
 from ...core.faces import Told
 from ...linear import Direct
 from ...mechanics.model.large_deformation import LargeDeformation
@@ -77,8 +78,7 @@ def large_multistart(
     starts: of Newton's method, after load steps found the first solution; seed: of their random
     choice; time_limit: seconds.  Raises NotConverged where load steps find none.
     """
-    if not starts >= 1:
-        raise InvalidInput(f"starts: expected at least 1, got {starts!r}")
+    starts, seed = whole("starts", starts, least=1), whole("seed", seed, least=0)
     began, deadline = now(), deadline_of(time_limit)
     first = drive(problem, tolerance=SOLVED, time_limit=deadline)
     if not first.converged:

@@ -18,8 +18,8 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.linalg import lapack
 
+from ...core.arrays import whole
 from ...core.clock import NEVER, Deadline, TimeLimit, deadline_of
-from ...core.errors import InvalidInput
 from ...core.onlookers import say
 from ...problem.friction import FrictionProblem
 from ...solvers.driver import drive
@@ -50,8 +50,7 @@ def multistart(
     tolerance: error by the judge that a solution may have.  The global form is condensed.
     Raises UnsupportedForm under Tresca's law.
     """
-    if not starts >= 1:
-        raise InvalidInput(f"starts: expected at least 1, got {starts!r}")
+    starts, seed = whole("starts", starts, least=1), whole("seed", seed, least=0)
     deadline = deadline_of(time_limit)
 
     def search(scaled: Scaled) -> Solutions:

@@ -15,6 +15,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from ...core.arrays import whole
 from ...core.errors import InvalidInput, shown
 from ...problem.friction import FrictionProblem
 from ...problem.solution import FrictionSolution
@@ -50,14 +51,13 @@ def maybe_others(
     a solve, often less.  Raises InvalidInput for a solution that has not converged, or of no
     FrictionProblem.
     """
-    problem = solution.problem
+    problem = getattr(solution, "problem", None)
     if not isinstance(problem, FrictionProblem) or not solution.converged:
         raise InvalidInput(
             f"expected a converged solution of a FrictionProblem, got {shown(str(solution))}",
             ("solution",),
         )
-    if not (isinstance(starts, int) and starts >= 1):
-        raise InvalidInput(f"expected a whole number >= 1, got {shown(starts)}", ("starts",))
+    starts, seed = whole("starts", starts, least=1), whole("seed", seed, least=0)
     tolerance = solution.convergence.tolerance
     most = max(LEAST, EFFORT * solution.convergence.iterations)
     random, known = np.random.default_rng(seed), [solution]

@@ -18,6 +18,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import linalg, sparse
 
+from ...core.arrays import number, whole
 from ...core.errors import InvalidInput
 from ...core.faces import Shown
 from ...mechanics.model.fields import by_body
@@ -127,10 +128,7 @@ def modes_of(
     state: SlidingState, count: int = 10, near: float = 0.0, model: Model | None = None
 ) -> Modes:
     """`count` modes nearest to a frequency, per unit of time; 0: the slowest."""
-    if not count >= 1:
-        raise InvalidInput(f"count: expected a number >= 1, got {count!r}")
-    if not (np.isfinite(near) and near >= 0):
-        raise InvalidInput(f"near: expected a frequency >= 0, got {near!r}")
+    count, near = whole("count", count, least=1), number("near", near, least=0.0)
     if state.K.shape[0] <= DENSE:
         s, shapes = _all(state)
     else:

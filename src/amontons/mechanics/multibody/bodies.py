@@ -117,6 +117,10 @@ class RigidBodies(KeepsLocks):
     torsion: float = 0.0
 
     def __post_init__(self) -> None:
+        for key in ("bodies", "planes", "joints", "apart"):
+            if not isinstance(getattr(self, key), Sequence | np.ndarray):
+                text = f"expected a list, got {shown(getattr(self, key))}"
+                raise InvalidInput(text, (key,))
         if not len(self.bodies):
             raise InvalidInput("expected one body at least", ("bodies",))
         for k, body in enumerate(self.bodies):
@@ -142,7 +146,8 @@ class RigidBodies(KeepsLocks):
         for k, joint in enumerate(self.joints):
             self._check_joint(joint, ("joints", k))
         for k, pair in enumerate(self.apart):
-            if len(pair) != 2 or not all(self._is_body(number) for number in pair):
+            two = isinstance(pair, Sequence | np.ndarray) and len(pair) == 2
+            if not two or not all(self._is_body(number) for number in pair):
                 text = f"expected two of the {len(self.bodies)} bodies, got {shown(pair)}"
                 raise InvalidInput(text, ("apart", k))
 
@@ -151,6 +156,8 @@ class RigidBodies(KeepsLocks):
 
     def _check_joint(self, joint: Joint, at: tuple[str, int]) -> None:
         """Raise InvalidInput for a joint of what is no body, or of one with itself."""
+        if not isinstance(joint, Joint):
+            raise InvalidInput(f"expected Joint, got {shown(joint)}", at)
         good = self._is_body(joint.first) and (
             self._is_body(joint.second) or joint.second == GROUND
         )

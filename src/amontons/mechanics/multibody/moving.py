@@ -35,7 +35,7 @@ from numpy.typing import NDArray
 
 from ...core.arrays import finite, number
 from ...core.clock import NEVER, Deadline
-from ...core.errors import Interrupted, InvalidInput, NotConverged
+from ...core.errors import Interrupted, InvalidInput, NotConverged, shown
 from ...problem.protocol import Problem
 from ...problem.solution import FrictionSolution
 from ...solvers.asked import Asked
@@ -91,6 +91,12 @@ def evolve_rigid(
         raise InvalidInput(f"expected a number > 0, got {step!r}", ("step",))
     if not number("overlap", overlap) > 0:
         raise InvalidInput(f"expected a number > 0, got {overlap!r}", ("overlap",))
+    if not isinstance(system, RigidBodies):
+        raise InvalidInput(f"system: expected RigidBodies, got {shown(system)}")
+    if not isinstance(start, RigidState | None):
+        raise InvalidInput(f"start: expected a RigidState, got {shown(start)}")
+    if not number("tolerance", tolerance) > 0:
+        raise InvalidInput(f"expected a number > 0, got {tolerance!r}", ("tolerance",))
     state = at_start(system) if start is None else start
     count = len(system.bodies)
     for name, values in state.motion._asdict().items():
@@ -99,7 +105,7 @@ def evolve_rigid(
             raise InvalidInput(
                 f"start: expected {name} of shape ({count}, {width}): it belongs to others"
             )
-    if not (np.isfinite(until) and until > state.time - WHOLE * step):
+    if not number("until", until) > state.time - WHOLE * step:
         raise InvalidInput(f"until: expected a time after {state.time:g}, got {until!r}")
     asked = Asked(tolerance, np.inf)
     return _steps(_Stepping(system, step, overlap * system.size, asked, solver, check),
