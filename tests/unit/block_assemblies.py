@@ -1,4 +1,4 @@
-"""Rigid blocks in the plane for limit analysis, and the four hinges of an arch as an oracle."""
+"""Rigid blocks in the plane for limit analysis, the four hinges of an arch, and tables."""
 
 from itertools import combinations
 
@@ -6,6 +6,8 @@ import numpy as np
 from scipy import sparse
 
 import amontons as am
+
+SQUARE = [(-1, -1), (1, -1), (1, 1), (-1, 1)]
 
 
 def assembly(blocks, joints, mu, live):
@@ -150,3 +152,17 @@ def column(count, width, height, mu):
 
 def sideways(k, centre, area):
     return (area, 0.0), centre
+
+
+def table(legs, weight=4.0, mu=0.5, height=1.0):
+    """A rigid table on a floor, its mass 1 at a height above the feet (k, 2)."""
+    H = np.zeros((6, 3 * len(legs)))
+    axes = np.array([[0, 0, 1], [1, 0, 0], [0, 1, 0]], dtype=float)  # normal, tangents
+    for k, (x, y) in enumerate(legs):
+        for a, axis in enumerate(axes):
+            H[:3, 3 * k + a] = axis
+            H[3:, 3 * k + a] = np.cross([x, y, -height], axis)
+    f = np.array([0, 0, -weight, 0, 0, 0])
+    return am.FrictionProblem.from_global(
+        sparse.eye_array(6).tocsc(), H, f, np.zeros((len(legs), 3)), np.full(len(legs), mu)
+    )
