@@ -45,7 +45,7 @@ from ...core.faces import Told
 Array = NDArray[np.float64]
 Places = NDArray[np.int64]
 PROGRAMS = 40  # of the sequence
-KEPT = 0.4  # of the friction bounds of the program before
+KEPT = (0.4, 0.7)  # of the friction bounds of the program before, one sequence each
 STILL = 1e-7  # velocity, of the largest of a mechanism, that counts as none
 ACCEPTED = 1e-6  # by which a state may miss (1), relative
 RESIDUAL = 1e-6  # that multipliers may leave of the rows that they combine
@@ -167,7 +167,15 @@ def _mechanisms(
     """Motions to look at: that of the relaxation, and those of the sequence of programs."""
     if more is not None:
         yield more
-    held, normal = first[:, 0], first[:, 0]
+    for kept in KEPT:
+        yield from _sequence(blocks, first[:, 0], kept, deadline)
+
+
+def _sequence(
+    blocks: Assembly, normal: Array, kept: float, deadline: Deadline
+) -> Iterator[Array]:
+    """The mechanisms of one sequence of programs, from normal forces (nc,) on."""
+    held = normal
     for _ in range(PROGRAMS):
         if not deadline.affords(PROGRAM):
             return
@@ -178,7 +186,7 @@ def _mechanisms(
             continue
         normal, w = found
         yield w
-        new = KEPT * held + (1 - KEPT) * normal
+        new = kept * held + (1 - kept) * normal
         if np.abs(new - held).max() <= STILL * max(float(np.abs(new).max()), 1e-300):
             return
         held = new
