@@ -4,12 +4,13 @@
                                            [--space 500] [--levels 2,3,4,5]
 
 Seconds are those of the processor; --limit is one of the clock for the finer triangles, and the
-work of so many seconds, counted in operations, in 3D.  Random problems have up to four contacts, any definite W
-and any shape of friction; the truth is every determinant by numpy, and every proof and witness
-goes through the checker of the tests, which shares no code with the package.  Proofs by
-multipliers are asked for 2 % below the critical friction without enumerating more than one
-contact, and must be refused 2 % above it.  In 3D, up to three contacts, nothing is exact: the
-lower bound must not be above the upper one, whose witness is checked with W alone.
+work of so many seconds, counted in operations, in 3D.  Random problems have up to four
+contacts, any definite W and any shape of friction; the truth is every determinant by numpy, and
+every proof and witness goes through the checker of the tests, which shares no code with the
+package.  Proofs by multipliers are asked for 2 % below the critical friction without
+enumerating more than one contact, and must be refused 2 % above it.  In 3D, up to three
+contacts, nothing is exact: the lower bound must not be above the upper one, whose witness is
+checked with W alone.
 
 Writes results/critical_friction.md beside this file.
 """

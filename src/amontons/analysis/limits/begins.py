@@ -286,7 +286,7 @@ class _Relaxation:
     def program(self, most: float) -> tuple[Array, Any, Any, Array]:
         """(c, A of A V <= 0, E of E V = e, e); V flat."""
         nc, last = self.opening.shape[0], self.rows - 1
-        normal = sparse.eye_array(nc, self.rows, format="csr")
+        normal = sparse.csr_array(sparse.eye_array(nc, self.rows))
         x, one = self._picked(last - 1), self._picked(last)
         inside = sparse.vstack(
             [normal, self.force + self.shear, self.force - self.shear, x, most * one - x]
