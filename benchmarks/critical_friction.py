@@ -3,12 +3,14 @@
     python benchmarks/critical_friction.py [--limit 60] [--contacts 15,25,50] [--random 500]
                                            [--space 500] [--levels 2,3,4,5]
 
-Seconds are those of the processor.  Random problems have up to four contacts, any definite W
-and any shape of friction; the truth is every determinant by numpy, and every proof and witness
-goes through the checker of the tests, which shares no code with the package.  Proofs by
-multipliers are asked for 2 % below the critical friction without enumerating more than one
-contact, and must be refused 2 % above it.  In 3D, up to three contacts, nothing is exact: the
-lower bound must not be above the upper one, whose witness is checked with W alone.
+Seconds are those of the processor; --limit is one of the clock for the finer triangles, and the
+work of so many seconds, counted in operations, in 3D.  Random problems have up to four
+contacts, any definite W and any shape of friction; the truth is every determinant by numpy, and
+every proof and witness goes through the checker of the tests, which shares no code with the
+package.  Proofs by multipliers are asked for 2 % below the critical friction without
+enumerating more than one contact, and must be refused 2 % above it.  In 3D, up to three
+contacts, nothing is exact: the lower bound must not be above the upper one, whose witness is
+checked with W alone.
 
 Writes results/critical_friction.md beside this file.
 """
@@ -31,7 +33,7 @@ from amontons.analysis.certificates.contact_multipliers import contact_multiplie
 from amontons.analysis.certificates.determinant_search import POSITIVE
 from amontons.analysis.certificates.friction_branching import Branching
 from amontons.analysis.certificates.status_pieces import Pieces
-from amontons.core.clock import NEVER
+from amontons.core.clock import NEVER, Deadline
 from amontons.mechanics.ready.hild import hild_triangle
 
 HERE = Path(__file__).parent
@@ -115,7 +117,7 @@ def in_space(levels, limit):
                          contacts=[am.Contact("bottom", am.Plane(normal=(0, 0, 1)), mu=0.3)])
         local = model.assemble().condensed()
         began = time.process_time()
-        found = am.critical_friction(local, time_limit=limit)
+        found = am.critical_friction(local, time_limit=Deadline.counted(limit))
         spent = time.process_time() - began
         began = time.process_time()
         verdict = am.uniqueness(local).verdict.value

@@ -31,6 +31,19 @@ def masonry() -> am.Model:
     return made.model([], [am.BodyForce((0, 0, -2000 * 9.81))])
 
 
+def pressed_wall() -> am.Model:
+    """Five rows of two elastic blocks in running bond, pressed by a steel plate with 30 kN.
+
+    The wall that was the example before that of the paper: 685 contacts, 7 240 unknowns.
+    """
+    stone = am.LinearElastic(2.2e9, 0.2, density=2000)
+    steel = am.LinearElastic(2.1e11, 0.3, density=7800)
+    made = am.Wall(5, 2, size=(0.4, 0.2, 0.2), cells=(8, 4, 4), material=stone,
+                   plate=0.05, plate_material=steel)  # fmt: skip
+    return made.model([am.Fix("plate.top", (0, 0, None))],
+                      [am.Traction("plate.top", (0, 0, -187500.0))])  # fmt: skip
+
+
 def spheres(count: int, mu: float, seed: int) -> am.FrictionProblem:
     """A packing at rest, or about to flow."""
     return SpherePacking(count, mu=mu, seed=seed).problem(1e-3)
@@ -46,6 +59,7 @@ CASES: dict[str, Callable[[], Any]] = {
     "rigid wall 6x4": lambda: wall(6, 4).problem(0.6),
     "rigid arch 15": lambda: arch(15).problem(0.6),
     "elastic wall": masonry,
+    "wall of 685": pressed_wall,
     "dome": lambda: am.read_case("example:dome").model,
 }
 

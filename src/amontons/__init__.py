@@ -42,7 +42,7 @@ _HOME = {
     "solvers.driver": ("drive",),
     "solvers.many": ("solve_many",),
     "analysis.certificates.rates": ("RateVerdict", "Rates", "rates"),
-    "analysis.solutions.second_start": ("Other", "maybe_others"),
+    "analysis.solutions.second_start": ("Other", "Others", "maybe_others"),
     "io.decks.written": ("write_deck",),
     "io.certificates": ("check_certificate", "write_certificate"),
     "io.fclib": ("read_fclib", "write_fclib"),

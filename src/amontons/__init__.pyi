@@ -26,7 +26,9 @@ from .analysis.gradients.steps import (
 from .analysis.gradients.with_jax import jax_function as jax_function
 from .analysis.gradients.with_torch import torch_function as torch_function
 from .analysis.paths.path_crossing import PathCrossing as PathCrossing
-from .analysis.solutions.second_start import Other as Other, maybe_others as maybe_others
+from .analysis.solutions.second_start import (
+    Other as Other, Others as Others, maybe_others as maybe_others,
+)
 from .app.api import solve as solve
 from .app.audit import audit as audit
 from .analysis.stability.coalescence import Flutter as Flutter

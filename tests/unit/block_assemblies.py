@@ -1,4 +1,4 @@
-"""Rigid blocks in the plane for limit analysis, and the four hinges of an arch as an oracle."""
+"""Rigid blocks in the plane for limit analysis, the four hinges of an arch, and tables."""
 
 from itertools import combinations
 
@@ -6,6 +6,8 @@ import numpy as np
 from scipy import sparse
 
 import amontons as am
+
+SQUARE = [(-1, -1), (1, -1), (1, 1), (-1, 1)]
 
 
 def assembly(blocks, joints, mu, live):
@@ -150,3 +152,60 @@ def column(count, width, height, mu):
 
 def sideways(k, centre, area):
     return (area, 0.0), centre
+
+
+def table(legs, weight=4.0, mu=0.5, height=1.0):
+    """A rigid table on a floor, its mass 1 at a height above the feet (k, 2)."""
+    H = np.zeros((6, 3 * len(legs)))
+    axes = np.array([[0, 0, 1], [1, 0, 0], [0, 1, 0]], dtype=float)  # normal, tangents
+    for k, (x, y) in enumerate(legs):
+        for a, axis in enumerate(axes):
+            H[:3, 3 * k + a] = axis
+            H[3:, 3 * k + a] = np.cross([x, y, -height], axis)
+    f = np.array([0, 0, -weight, 0, 0, 0])
+    return am.FrictionProblem.from_global(
+        sparse.eye_array(6).tocsc(), H, f, np.zeros((len(legs), 3)), np.full(len(legs), mu)
+    )
+
+
+def masonry(rows, height, mu):
+    """Courses of blocks, each a list of their ends (left, right), pushed like a column."""
+    blocks, joints, below = [], [], []
+    for k, row in enumerate(rows):
+        y, here = k * height, []
+        for left, right in row:
+            number = len(blocks)
+            blocks.append(np.array([[left, y], [right, y], [right, y + height],
+                                    [left, y + height]]))  # fmt: skip
+            for other, low, high in below if k else [(-1, left, right)]:
+                ends = max(left, low), min(right, high)
+                if ends[1] - ends[0] > 1e-9:
+                    bed = tuple(np.array([x, y]) for x in ends)
+                    joints.append((number, other, bed, (0.0, 1.0)))
+            if here and abs(here[-1][2] - left) < 1e-9:
+                head = np.array([left, y]), np.array([left, y + height])
+                joints.append((number, here[-1][0], head, (1.0, 0.0)))
+            here.append((number, left, right))
+        below = here
+    return assembly(blocks, joints, mu, sideways)
+
+
+def running_bond(rows, blocks, length, height, mu, halves=True):
+    """A wall of `masonry`; halves: half blocks at the ends of the first, third, ... course."""
+    whole = [k * length for k in range(blocks + 1)]
+    half = [0.0, *(x + length / 2 for x in whole[:-1]), whole[-1]]
+    courses = [half if (k % 2 == 0) == halves else whole for k in range(rows)]
+    return masonry([list(zip(x[:-1], x[1:], strict=True)) for x in courses], height, mu)
+
+
+def groove(seed):
+    """A block in a groove of two planes, pushed by a force somewhere."""
+    random = np.random.default_rng(seed)
+    a, b = random.uniform(0.1, 1.2, 2)
+    mu = random.uniform(0.2, 1.0)
+    left, right = np.array([-np.cos(a), np.sin(a)]), np.array([np.cos(b), np.sin(b)])
+    block = np.array([[0.0, 0.0], right, right + [-0.3, 0.8], left + [0.3, 0.8], left])
+    joints = [(0, -1, (0.2 * left, left), (np.sin(a), np.cos(a))),
+              (0, -1, (0.2 * right, right), (-np.sin(b), np.cos(b)))]  # fmt: skip
+    force, point = random.standard_normal(2), random.uniform(-0.5, 0.5, 2) + [0, 0.5]
+    return assembly([block], joints, mu, lambda k, centre, area: (tuple(force * area), point))

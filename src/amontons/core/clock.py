@@ -172,7 +172,7 @@ class Deadline:
 
 
 NEVER = Deadline()
-TimeLimit = float | Deadline | None
+TimeLimit = float | Deadline | None  # seconds of the clock on the wall, as in all `time_limit`
 
 
 def deadline_of(time_limit: TimeLimit, budget: float = math.inf) -> Deadline:

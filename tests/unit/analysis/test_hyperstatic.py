@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from block_assemblies import SQUARE, table
 from scipy import sparse
 from status_polytopes import Polytopes
 
@@ -16,23 +17,6 @@ from amontons.analysis.hyperstatic.ranges import reaction_ranges
 from amontons.core.clock import Deadline
 from amontons.mechanics.ready.hild import hild_triangle
 from amontons.mechanics.ready.packings import SpherePacking
-
-
-def table(legs, weight=4.0, mu=0.5, height=1.0):
-    """A rigid table on a floor, its mass 1 at a height above the feet (k, 2)."""
-    H = np.zeros((6, 3 * len(legs)))
-    axes = np.array([[0, 0, 1], [1, 0, 0], [0, 1, 0]], dtype=float)  # normal, tangents
-    for k, (x, y) in enumerate(legs):
-        for a, axis in enumerate(axes):
-            H[:3, 3 * k + a] = axis
-            H[3:, 3 * k + a] = np.cross([x, y, -height], axis)
-    f = np.array([0, 0, -weight, 0, 0, 0])
-    return am.FrictionProblem.from_global(
-        sparse.eye_array(6).tocsc(), H, f, np.zeros((len(legs), 3)), np.full(len(legs), mu)
-    )
-
-
-SQUARE = [(-1, -1), (1, -1), (1, 1), (-1, 1)]
 
 
 @pytest.mark.parametrize("form", ["global", "delassus"])

@@ -4,10 +4,12 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from block_assemblies import arch, column, four_hinges, sideways
+from block_assemblies import arch, column, four_hinges, groove, running_bond, sideways
+from motion_patterns import least_load
 
 import amontons as am
 from amontons.app.cli.sources import open_source
+from amontons.core.clock import Deadline
 from amontons.mechanics.ready.gallery import GALLERY
 
 
@@ -134,6 +136,49 @@ def test_units_of_the_live_load_change_nothing(weight):
     found = am.collapse_load(heavy, grows)
     assert found.upper == pytest.approx(0.5 * weight, rel=1e-7)
     assert found.width < 0.01
+    assert found.begins.upper == pytest.approx(0.5 * weight, rel=1e-6)
+    assert grows @ found.begins.w == pytest.approx(1.0)
+    balance = heavy.H @ found.begins.r.ravel() + heavy.f + found.begins.upper * grows
+    assert np.abs(balance).max() < 1e-9 * np.abs(found.begins.r).max()
+
+
+@pytest.mark.parametrize("seed", [6, 19, 31])
+def test_a_motion_begins_where_all_patterns_say(seed):
+    """Grooves, in two of which slip that does not dilate gives way before limit analysis."""
+    problem, grows = groove(seed)
+    wanted = least_load(problem.H.toarray(), problem.f, grows, problem.mu)
+    found = am.collapse_load(problem, grows)
+    first = found.begins
+    assert first.lower <= wanted and first.upper == pytest.approx(wanted, rel=1e-6)
+    assert first.width < 3e-3 and first.violation < 1e-9 and first.residual < 1e-9
+    if seed != 6:
+        assert wanted < 0.96 * found.upper
+        assert first.width < 1e-5
+    assert grows @ first.w == pytest.approx(1.0)
+    balance = problem.H @ first.r.ravel() + problem.f + first.upper * grows
+    assert np.abs(balance).max() < 1e-9 * np.abs(first.r).max()
+
+
+@pytest.mark.parametrize(("rows", "blocks", "mu"), [(3, 2, 0.65), (5, 1, 0.65)])
+def test_walls_with_head_joints_are_bounded_closely(rows, blocks, mu):
+    """A low wall slides at mu, as a whole; a slender one gives way before limit analysis."""
+    problem, grows = running_bond(rows, blocks, 0.4, 0.175, mu)
+    found = am.collapse_load(problem, grows, gap=0.5)
+    assert found.begins.width < 1e-5
+    if rows == 3:
+        assert found.begins.upper == pytest.approx(mu, rel=1e-6)
+    else:
+        assert found.begins.upper < 0.95 * found.upper
+    assert "A motion that the live load drives can begin at" in str(found)
+
+
+def test_what_can_not_be_relaxed_in_time_still_has_a_witness():
+    """Ferris and Tin-Loi's first wall: .64286 by limit analysis; real slip gives way before."""
+    problem, grows = running_bond(6, 5, 0.4, 0.175, 0.65)
+    found = am.collapse_load(problem, grows, time_limit=Deadline.counted(2.0))
+    assert found.upper == pytest.approx(0.64286, abs=5e-6)
+    assert found.begins.upper < 0.641 and found.begins.lower == found.lower
+    assert found.begins.violation < 1e-6
 
 
 def test_a_wall_of_blocks_is_bounded_on_both_sides():

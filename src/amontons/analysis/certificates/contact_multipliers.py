@@ -29,14 +29,15 @@ covers rounding, for W as given.
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ...core.clock import NEVER, Deadline
-from ..multipliers.rounding import EPSILON, is_positive_definite, unit_scale
+from .contact_proof import ContactMultipliers, holds
 from .energy_bound import energy_bound
-from .pencil import INDEFINITE, Pencil
+from .pencil import DENSE, INDEFINITE, Pencil, symmetrised
 from .thinning import COARSEST, couplings, spread_out
 
 Array = NDArray[np.float64]
@@ -47,29 +48,10 @@ SHIFTS = (-0.7, -0.35, 0.0, 0.2, 0.5, 0.7, 1.0)  # of log alpha, tried with all 
 SHARES = (1.0, 0.6, 0.3, 0.0)  # of the variation of the others, until A is definite
 SOFT = (40.0, 100.0)  # over how much of the largest L is smoothed, one search after the other
 STEPS = 60  # of a search where contacts are few
-MANY, FINE_STEPS = 1000, 18  # rows from which on, and steps where a coarser answer was at hand
+MANY, FINE_STEPS = 1000, 40  # rows from which on, and steps where a coarser answer was at hand
 ROOMS = (1e-4, 1e-3, 5e-3, 2e-2, 0.1)  # by which less is proved than was found
+SINGLE = 0.25  # of the work of RATE: half the length, and products of matrices
 PROOF = 1.0  # operations of a proof per cube of the rows
-
-
-@dataclass(frozen=True, eq=False)
-class ContactMultipliers:
-    """At friction t shape every load has one solution, t = 0 without a proof.
-
-    tau, sigma, alpha (k,), f (k, d - 1): the multipliers that prove it; 1 and 0 for contacts
-    that can not react.  expected: t of them in floating point, before the proof.
-    """
-
-    t: float
-    tau: Array
-    sigma: Array
-    alpha: Array
-    f: Array
-    expected: float = 0.0
-
-    def unscaled(self, scale: Array) -> ContactMultipliers:
-        """In units in which reactions are divided by scale (k d,), one number per contact."""
-        return replace(self, alpha=self.alpha * scale[:: len(scale) // len(self.tau)] ** 2)
 
 
 def contact_multipliers(
@@ -95,45 +77,6 @@ def contact_multipliers(
     return replace(whole, t=best.t, expected=best.expected)
 
 
-def holds(W: Array, shape: Array, t: float, by: ContactMultipliers) -> bool:
-    """True when A - t B of the module docstring is positive definite, rounding included.
-
-    W (k d, k d) and multipliers as given, all contacts reacting.
-    """
-    k = len(shape)
-    d = len(W) // k
-    if not (np.isfinite(t) and min(x.min() for x in (by.tau, by.sigma, by.alpha)) > 0):
-        return False
-    normal = d * np.arange(k)
-    tangent = (normal[:, None] + np.arange(1, d)).ravel()
-    D = np.empty(len(W))
-    D[normal], D[tangent] = by.tau, by.sigma.repeat(d - 1)
-    f = by.f.ravel()
-    M = D[:, None] * W
-    M[tangent] += f[:, None] * W[normal.repeat(d - 1)]
-    M = (M + M.T) / 2
-    rows = W[tangent]
-    at_normal = 0.5 * t * shape * by.sigma * by.alpha
-    weight = (0.5 * t * shape * by.sigma / by.alpha).repeat(d - 1)
-    M -= rows.T @ (weight[:, None] * rows)
-    M[normal, normal] -= at_normal
-    scale = unit_scale(M)
-    # sums of the rows of the terms' sizes, of which the rounding of an entry is a part
-    ones, size = scale, np.abs(W)
-    turned = D * ones
-    turned[normal] += (np.abs(f) * ones[tangent]).reshape(k, -1).sum(axis=1)
-    spread = size @ ones
-    from_normal = np.abs(f) * spread[normal.repeat(d - 1)]
-    spread = D * spread
-    spread[tangent] += from_normal
-    spread = (spread + size.T @ turned) / 2
-    spread += np.abs(rows).T @ (weight * (np.abs(rows) @ ones))
-    spread[normal] += at_normal * ones[normal]
-    M = (M + M.T) / 2 * scale[:, None] * scale
-    rounding = (len(W) + 12) * EPSILON * float((spread * scale).max())
-    return is_positive_definite(M, rounding / len(W))
-
-
 # ------------------------------------------------------------------------ searching
 def _searched(form: _Form, deadline: Deadline, wanted: float) -> Array:
     """Multipliers x of the largest t found."""
@@ -146,6 +89,7 @@ def _searched(form: _Form, deadline: Deadline, wanted: float) -> Array:
         coarse, weight = form.thinned()
         x = form.interpolated(_searched(coarse, deadline, np.inf), weight)
         steps = FINE_STEPS if len(form.W) > MANY else STEPS
+        form = form.for_search(x)
         x = form.shifted(x, deadline)
     for soft in SOFT:
         x = form.improved(x, soft, steps, deadline, wanted * (1 + 10 * ROOMS[0]))
@@ -178,6 +122,21 @@ class _Form(Pencil):
         tangent = (normal[:, None] + np.arange(1, d)).ravel()
         return cls(W / root / root[:, None], shape, root, normal, tangent, own.repeat(d - 1))
 
+    def for_search(self, x: Array) -> _Form:
+        """The same in numbers of half the length where A is definite in them at x too.
+
+        Half the work of large matrices; what is found is proved in numbers of full length.
+        """
+        if self.size <= DENSE:
+            return self
+        single = replace(self, W=self.W.astype(np.float32))
+        return self if single.factor(x) is None else single
+
+    @cached_property
+    def sliding(self) -> Array:
+        """Rows of W of the tangents, (k (d - 1), k d)."""
+        return self.W[self.tangent]
+
     @property
     def contacts(self) -> int:
         """k."""
@@ -197,6 +156,11 @@ class _Form(Pencil):
     def size(self) -> int:
         """Rows of W."""
         return len(self.W)
+
+    @property
+    def operations(self) -> float:
+        """Of one evaluation; numbers of half the length go through four times as fast."""
+        return super().operations * (SINGLE if self.W.dtype == np.float32 else 1.0)
 
     # ------------------------------------------------------------- coarser and finer
     def thinned(self) -> tuple[_Form, Array]:
@@ -247,12 +211,14 @@ class _Form(Pencil):
 
     def energy(self, x: Array) -> Array:
         """A (k d, k d)."""
-        tau, sigma, _, f = self.parts(x)
-        A = np.empty_like(self.W)
-        A[self.normal] = tau[:, None] * self.W[self.normal]
-        A[self.tangent] = sigma[self.owner][:, None] * self.W[self.tangent]
-        A[self.tangent] += f[:, None] * self.W[self.normal[self.owner]]
-        return (A + A.T) / 2
+        tau, sigma, _, f = (part.astype(self.W.dtype) for part in self.parts(x))
+        W = self.W.reshape(self.contacts, self.dimension, -1)
+        A = np.empty_like(W)
+        np.multiply(W[:, 0], tau[:, None], out=A[:, 0])
+        np.multiply(W[:, 1:], sigma[:, None, None], out=A[:, 1:])
+        for j, own in enumerate(f.reshape(self.contacts, -1).T, 1):
+            A[:, j] += own[:, None] * W[:, 0]
+        return symmetrised(A.reshape(self.W.shape))
 
     def weights(self, x: Array) -> tuple[Array, Array]:
         """Of dr_N^2 (k,) and of the tangents of du (k (d - 1),) in B."""
@@ -262,8 +228,8 @@ class _Form(Pencil):
 
     def times(self, x: Array, v: Array) -> Array:
         """B v for columns v."""
-        at_normal, at_tangent = self.weights(x)
-        out = self.W[self.tangent].T @ (at_tangent[:, None] * (self.W[self.tangent] @ v))
+        at_normal, at_tangent = (part.astype(v.dtype) for part in self.weights(x))
+        out = self.sliding.T @ (at_tangent[:, None] * (self.sliding @ v))
         out[self.normal] += at_normal[:, None] * v[self.normal]
         return out
 
@@ -271,7 +237,8 @@ class _Form(Pencil):
         """Gradient by eigenvectors v with v A v = 1, weighted by p (m,)."""
         _, sigma, alpha, f = self.parts(x)
         k, wp = self.contacts, w * p
-        u = self.W @ v
+        u = (self.W @ v).astype(float)
+        v = v.astype(float)
         own = -(v * u) @ wp
         at_normal = 0.5 * self.shape * ((v[self.normal] ** 2) @ p) * sigma * alpha
         sliding = np.bincount(self.owner, (u[self.tangent] ** 2) @ p, k)
@@ -307,3 +274,6 @@ class _Form(Pencil):
             if holds(given, self.shape, t * (1 - room), by):
                 return replace(by, t=t * (1 - room))
         return by
+
+
+__all__ = ["ContactMultipliers", "contact_multipliers", "holds"]

@@ -17,13 +17,14 @@ from scipy.linalg import LinAlgError, cholesky, solve_triangular
 from scipy.sparse.linalg import ArpackNoConvergence, LinearOperator, eigsh
 
 from ...core.clock import NEVER, Deadline
-from ..multipliers.rounding import EPSILON, is_positive_definite, unit_scale
+from .contact_proof import ContactMultipliers, holds
 
 Array = NDArray[np.float64]
 POWERS = (0.0, 0.5, 1.0)  # of |W_ii|, to which alpha is proportional
+SYMMETRIC = 1e-12  # relative: what is estimated does not see less
 EXACT = 400  # rows up to which norms come from all singular values
-ESTIMATED = 3.0  # operations of the estimate per cube of the rows, without its norms
-PROVED = 4.0  # the same of a proof
+ESTIMATED = 1.0  # operations of the estimate per cube of the rows, without its norms
+PROVED = 1.0  # the same of a proof
 
 
 def energy_bound(
@@ -49,9 +50,14 @@ def energy_bound(
         root = cholesky((W + W.T) / 2, lower=True)
     except LinAlgError:
         return 0.0, np.ones(k)
-    to_energy = solve_triangular(root, np.eye(len(W)), lower=True)
     normal, tangent = _directions(W, shape)
-    A, B = to_energy[:, normal], W[tangent] @ to_energy.T
+    forces = np.zeros((len(W), len(shape)), order="F")
+    forces[normal, np.arange(len(shape))] = 1.0
+    A = solve_triangular(root, forces, lower=True, overwrite_b=True)
+    if np.abs(W - W.T).max() <= SYMMETRIC * np.abs(W).max():
+        B = root[tangent]
+    else:
+        B = solve_triangular(root, W[tangent].T, lower=True).T
     best, chosen = 0.0, np.ones(len(size))
     for power in POWERS:
         t, alpha = _estimate(A, B, shape, (size / size.max()) ** power)
@@ -59,9 +65,11 @@ def energy_bound(
             best, chosen = t, alpha
     whole = np.ones(k)
     whole[able] = chosen
+    one = np.ones(len(size))
+    by = ContactMultipliers(best, one, one, chosen, np.zeros((len(size), d - 1)))
     for room in (1e-9, 1e-6, 1e-3, 1e-1) if best > 0 else ():
         deadline.pay(PROVED * len(W) ** 3)
-        if _holds(W, shape, best * (1 - room), chosen):
+        if holds(W, shape, best * (1 - room), by):
             return best * (1 - room), whole
     return 0.0, whole
 
@@ -99,18 +107,3 @@ def _directions(W: Array, shape: Array) -> tuple[NDArray[np.int64], NDArray[np.i
     d = len(W) // len(shape)
     normal = np.arange(len(shape)) * d
     return normal, np.setdiff1d(np.arange(len(W)), normal)
-
-
-def _holds(W: Array, shape: Array, t: float, alpha: Array) -> bool:
-    """True when the matrix of the module docstring is positive definite, proved."""
-    normal, tangent = _directions(W, shape)
-    half = 0.5 * t * shape
-    rows = W[tangent]
-    weight = np.repeat(half / alpha, len(tangent) // len(normal))[:, None]
-    M = (W + W.T) / 2 - rows.T @ (weight * rows)
-    M[normal, normal] -= half * alpha
-    size = np.abs(W + W.T) / 2 + np.abs(rows.T) @ (weight * np.abs(rows))
-    size[normal, normal] += half * alpha
-    scale = unit_scale(M)
-    M = (M + M.T) / 2 * scale[:, None] * scale
-    return is_positive_definite(M, (len(W) + 8) * EPSILON * size * scale[:, None] * scale)

@@ -3,12 +3,13 @@
 A is to be positive definite, B may be indefinite; both depend smoothly on x.  Minimised is the
 largest L of B v = L A v, t = 1 / L, smoothed over the largest few: log L + log(sum exp(soft
 (L_i / L - 1))) / soft, whose derivative comes from the eigenvectors.  All of it is floating
-point; what was found has to be proved.
+point, of the precision in which A and B come; what was found has to be proved.
 """
 
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
+from collections.abc import Callable
 
 import numpy as np
 from numpy.typing import NDArray
@@ -23,6 +24,7 @@ FARTHEST = 300.0  # size of x, logarithms among them, beyond which nothing is tr
 DENSE = 400  # rows up to which all eigenvalues are computed
 KEPT = 40  # largest ones that count beyond
 DEPTH = 3  # products of the block Krylov space in which they are looked for
+TILE = 256  # rows of a matrix and its transpose that fit into the cache together
 SHARPENED = 4  # times that the largest eigenvalue is looked for before a proof
 
 
@@ -54,12 +56,18 @@ class Pencil(ABC):
         n = float(self.size)
         return 8.0 * n**3 if n <= DENSE else n**3 / 3 + 5.0 * DEPTH * KEPT * n**2
 
-    def largest(self, x: Array) -> tuple[Array, Array] | None:
-        """(L, v) of the largest few of B v = L A v, ascending; None where A is indefinite."""
-        try:
-            root = cholesky(self.energy(x), lower=True, check_finite=False)
+    def factor(self, x: Array) -> Array | None:
+        """L (size, size) of A = L L^T, None where A is indefinite."""
+        try:  # A.T is A, and what Cholesky's method overwrites without a copy
+            return cholesky(self.energy(x).T, lower=True, overwrite_a=True, check_finite=False)
         except LinAlgError:
             return None
+
+    def largest(self, x: Array, root: Array) -> tuple[Array, Array] | None:
+        """(L, v) of the largest few of B v = L A v, ascending; None without finite ones.
+
+        root: of A at x.
+        """
 
         def product(y: Array) -> Array:
             v = solve_triangular(root, y, lower=True, trans=1, check_finite=False)
@@ -67,22 +75,24 @@ class Pencil(ABC):
 
         size = self.size
         if size <= DENSE:
-            C = product(np.eye(size))
+            C = product(np.eye(size, dtype=root.dtype))
             few = (max(0, size - KEPT), size - 1)
             w, y = eigh((C + C.T) / 2, check_finite=False, subset_by_index=few)
         else:
-            w, y = self._in_subspace(product, size)
+            w, y = self._in_subspace(product, root)
         if not (len(w) and np.isfinite(w).all()):  # A is singular to rounding
             return None
         return w, solve_triangular(root, y, lower=True, trans=1, check_finite=False)
 
-    def _in_subspace(self, product, size: int) -> tuple[Array, Array]:  # type: ignore[no-untyped-def]
+    def _in_subspace(
+        self, product: Callable[[Array], Array], root: Array
+    ) -> tuple[Array, Array]:
         """Ritz values and vectors of a block Krylov space that begins with the last ones."""
         begin, depth = self.subspace, DEPTH
         if begin is None:
-            begin = np.random.default_rng(0).standard_normal((size, KEPT))
+            begin = np.random.default_rng(0).standard_normal((len(root), KEPT))
             depth = 3 * DEPTH
-        Q = np.linalg.qr(begin)[0]
+        Q = np.linalg.qr(begin.astype(root.dtype, copy=False))[0]
         blocks, images = [Q], []
         for k in range(depth):
             images.append(product(blocks[-1]))
@@ -93,16 +103,20 @@ class Pencil(ABC):
                 blocks.append(np.linalg.qr(new)[0])
         basis, image = np.hstack(blocks), np.hstack(images)
         H = basis.T @ image
+        if not np.isfinite(H).all():
+            return np.full(1, np.nan), basis[:, :1]  # told as none
         w, s = eigh((H + H.T) / 2)
         y = basis @ s[:, -KEPT:]
         self.subspace = y
-        return w[-KEPT:], y
+        return w[-KEPT:].astype(float), y
 
     def sharpened(self, x: Array) -> float:
         """t = 1 / L at x, as well as can be told; inf without an L > 0, 0 without A."""
-        found = self.largest(x)
+        root = self.factor(x)
+        found = None if root is None else self.largest(x, root)
         for _ in range(SHARPENED if found is not None and self.size > DENSE else 0):
-            found = self.largest(x)  # each goes on from the subspace of the last
+            assert root is not None
+            found = self.largest(x, root)  # each goes on from the subspace of the last
         if found is None:
             return 0.0
         return float(1 / found[0][-1]) if found[0][-1] > 0 else np.inf
@@ -112,7 +126,8 @@ class Pencil(ABC):
 
         Minus INDEFINITE where no L is positive: every t is good.
         """
-        found = self.largest(x)
+        root = self.factor(x)
+        found = None if root is None else self.largest(x, root)
         if found is None:
             return INDEFINITE, np.zeros_like(x)
         w, v = found
@@ -153,3 +168,14 @@ class Pencil(ABC):
         except (StopIteration, TimeUp):
             pass
         return best[1]
+
+
+def symmetrised(A: Array) -> Array:
+    """(A + A^T) / 2 in the place of A."""
+    parts = [slice(i, i + TILE) for i in range(0, len(A), TILE)]
+    for k, rows in enumerate(parts):
+        for columns in parts[: k + 1]:
+            block = A[rows, columns] + A[columns, rows].T
+            block *= 0.5
+            A[rows, columns], A[columns, rows] = block, block.T
+    return A

@@ -17,10 +17,12 @@ from ...core.clock import RATE, Deadline, TimeLimit, deadline_of, now
 from ...core.errors import InvalidInput, SingularOperator, TimeUp
 from ...core.onlookers import say
 from ...linear.dense import dense
-from ...problem.friction import FrictionProblem
+from ...problem.friction import Form, FrictionProblem
 from ...problem.law import Coulomb, Law, Tresca
-from ...problem.solution import Convergence, FrictionSolution
+from ...problem.solution import FrictionSolution
 from ...solvers.driver import drive
+from ..hyperstatic.freedom import freedom_of
+from ..quick import BOUND_WORK, allowed, quick_deadline, rows_of
 from ..scaled import COPIES, UNRESOLVED, Scaled
 from ..solutions.discs.search import enumerate_discs
 from ..solutions.enumerate import PieceSolution, Solutions, enumerate_solutions
@@ -37,11 +39,7 @@ Array = NDArray[np.float64]
 ENUMERATED = 25  # contacts up to which all solutions are looked for before a certificate
 REGIONS = 10  # contacts in 3D up to which all solutions are looked for after it
 INSTANT = 8  # contacts up to which the quick verdict examines all patterns: milliseconds
-QUICK = 400  # rows of W up to which the quick verdict is always given: some ten milliseconds
-SHARE = 0.2  # of the operations of a solve, for the quick verdict
-BOUND_WORK = 7.0  # operations of the cheapest bound per cube of the rows
 SECONDS = 60.0  # whose work a verdict without a time limit may take
-QUICK_SECONDS = 1.0  # the same of a quick one
 ABOVE = 1e-9  # relative, at which a friction is proved to be safe
 BOUNDS = 0.5  # part of the time for the bounds on the critical friction
 MANY = {2: 25, 3: 100}  # contacts in 2D and 3D from which on short ways come first
@@ -94,20 +92,44 @@ def assess(
     return _finished(verdict, began)
 
 
-def quick_verdict(problem: FrictionProblem, spent: float = 0.0) -> Uniqueness | None:
+def quick_verdict(
+    problem: FrictionProblem, spent: float = 0.0, solution: FrictionSolution | None = None
+) -> Uniqueness | None:
     """The part of the verdict that costs next to nothing beside a solve.
 
     spent: operations of the solve, of which a fifth may be used; up to QUICK rows of W, some
     ten milliseconds, nobody asks.  Where that is not enough, `cause` says what was met and
-    `decided_by` what would decide.  None under laws of which nothing is proved.
+    `decided_by` what would decide.  solution: the one found; where W is singular or missing
+    `freedom` says what its motion leaves open of the reactions.  None under laws of which
+    nothing is proved.
     """
     if not isinstance(problem.law, Coulomb | Tresca):
         return None
-    began, rows = now(), problem.contacts * problem.dimension
-    allowed = max(SHARE * spent, BOUND_WORK * float(min(rows, QUICK)) ** 3)
-    deadline = Deadline.counted(max(QUICK_SECONDS if rows <= QUICK else 0.0, allowed / RATE))
+    began, deadline = now(), quick_deadline(problem, spent)
+    verdict = _quickly(problem, allowed(problem, spent), deadline, began)
+    given = solution is not None and solution.converged and isinstance(problem.law, Coulomb)
+    if not given or not _may_hold_itself(verdict, problem):
+        return verdict
+    assert solution is not None
+    found = freedom_of(problem, solution, deadline)
+    reason = f"{verdict.reason} {found}"
+    return _finished(replace(verdict, reason=reason, freedom=found), began)
+
+
+def _may_hold_itself(verdict: Uniqueness, problem: FrictionProblem) -> bool:
+    """Whether there may be reactions that move nothing, and telling is cheap."""
+    if verdict.cause is Cause.LARGE:
+        return problem.form is Form.GLOBAL and problem.condensing_is_cheap
+    return verdict.cause in (Cause.NO_W, Cause.SINGULAR)
+
+
+def _quickly(
+    problem: FrictionProblem, work: float, deadline: Deadline, began: float
+) -> Uniqueness:
+    """`quick_verdict` without reactions; work: operations that may be spent."""
+    rows = rows_of(problem)
     try:
-        cause = _why_not(problem, rows, allowed)
+        cause = _why_not(problem, rows, work)
         if cause is not None:
             return _not_examined(problem, cause, rows, began)
         local = problem.condensed()
@@ -132,16 +154,11 @@ def quick_verdict(problem: FrictionProblem, spent: float = 0.0) -> Uniqueness | 
     return _finished(verdict, began)
 
 
-def operations_of(record: Convergence) -> float:
-    """Of a solve: counted, or as many as its seconds are good for."""
-    return record.flops if record.flops is not None else record.seconds * RATE
-
-
-def _why_not(problem: FrictionProblem, rows: int, allowed: float) -> Cause | None:
+def _why_not(problem: FrictionProblem, rows: int, work: float) -> Cause | None:
     """Why a problem is not examined, None where it is."""
     if problem.loose_modes.shape[1]:
         return Cause.NO_W
-    if BOUND_WORK * float(rows) ** 3 > allowed:
+    if BOUND_WORK * float(rows) ** 3 > work:
         return Cause.LARGE
     return None if problem.condensing_is_cheap else Cause.NOT_FORMED
 

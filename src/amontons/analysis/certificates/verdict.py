@@ -15,6 +15,7 @@ from ...core.words import shortened
 from ...problem.friction import FrictionProblem
 from ...problem.law.law import MU
 from ...problem.solution import FrictionSolution
+from ..hyperstatic.freedom import Freedom
 from ..hyperstatic.indeterminacy import Indeterminacy
 from ..solutions.enumerate import PieceSolution
 from .critical_friction import CriticalFriction, Witness
@@ -71,7 +72,8 @@ class Uniqueness(Told):
     load can make.  0 for every load, None where nothing is known.
     indeterminacy: where W is singular or missing, what is known of motion and reactions apart;
     lower and upper are then about motions.
-    cause: of a quick verdict that is not settled, what stood in its way.
+    cause: of a quick verdict that is not settled, what stood in its way; freedom: what it
+    knows of the reactions then, where W is singular or missing.
     """
 
     verdict: Verdict
@@ -89,6 +91,7 @@ class Uniqueness(Told):
     resolution: float | None = None
     indeterminacy: Indeterminacy | None = None
     cause: Cause | None = None
+    freedom: Freedom | None = None
 
     def __str__(self) -> str:
         upper = "unknown" if np.isinf(self.upper) else f"{self.upper:.4g}"
@@ -161,6 +164,7 @@ class Uniqueness(Told):
                 "seconds": self.seconds,
                 "cause": None if self.cause is None else self.cause.value[0],
                 "decided_by": None if self.cause is None else self.cause.value[2],
+                **({} if self.freedom is None else {"reactions": self.freedom.record}),
                 **({} if self.indeterminacy is None else self.indeterminacy.record),
                 }  # fmt: skip
 

@@ -195,10 +195,19 @@ def face_of(problem: FrictionProblem, solution: FrictionSolution, deadline: Dead
 
 def _speed(problem: FrictionProblem, solution: FrictionSolution) -> float:
     """The velocity that counts as none: what the solution may be off by."""
-    size = float(np.linalg.norm(solution.u))
+    return SURELY * max(solution.convergence.error, STILL) * size_of_motion(problem, solution)
+
+
+def size_of_motion(problem: FrictionProblem, solution: FrictionSolution) -> float:
+    """|u| of the free motion; what contact alone holds has none: of what its reactions move.
+
+    A body at rest moves by rounding alone, of which its own |u| would say nothing.
+    """
     if not problem.loose_modes.shape[1]:
-        size = float(np.linalg.norm(problem.free_velocity))
-    return SURELY * max(solution.convergence.error, STILL) * size
+        return float(np.linalg.norm(problem.free_velocity))
+    rho = np.where(problem.rho > 0, problem.rho, np.inf)[:, None]
+    moved = float(np.linalg.norm(solution.r / rho))
+    return max(float(np.linalg.norm(solution.u)), moved)
 
 
 def _rays(r: Array, u: Array, mu: Array, loaded: NDArray[np.bool_]) -> Array:

@@ -17,9 +17,10 @@ that the load at which a motion first can begin lies below the one of limit anal
   If no w but 0 does that (a rank), no motion begins at x.
 
 The least r_N of a face is one linear program each.  They are taken over intervals of x, with r^
-in between linear, from 0 up to the first that can not be excluded: `lower`.  Between lower and
-upper nothing is claimed.  Where blocks rock rather than slide both meet.  Linear programs keep
-to their constraints within 1e-7 of the loads; inequalities have to hold by STRICT.
+in between linear, from 0 up to the first that can not be excluded: `lower`.  Where blocks rock
+rather than slide both meet.  In the plane `begins` bounds the load in between at which a motion
+that the live load drives can begin.  Linear programs keep to their constraints within 1e-7 of
+the loads; inequalities have to hold by STRICT.
 
 [D] D. C. Drucker, "Coulomb friction, plasticity, and limit loads", J. Appl. Mech. 21 (1954);
 masonry: R. K. Livesley, Int. J. Numer. Methods Engrg. 12 (1978) 1853-1871.
@@ -27,7 +28,7 @@ masonry: R. K. Livesley, Int. J. Numer. Methods Engrg. 12 (1978) 1853-1871.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -40,12 +41,15 @@ from ...core.errors import InvalidInput, UnsupportedLaw
 from ...core.faces import Told
 from ...problem.friction import Form, FrictionProblem
 from ...problem.law import Coulomb
+from ..hyperstatic.face import lp_work
+from .begins import Assembly, Begins, begins
 
 Array = NDArray[np.float64]
 SIDES = 48  # of the polygons that stand for discs in 3D
 GAP = 2e-3  # relative distance of both bounds at which the search ends
 WORK = 60.0  # seconds by default
 STRICT = 1e-6  # of loads, by which inequalities hold strictly: above what programs tolerate
+BEGINS = 0.6  # part of the time for the load at which motions begin
 FEWEST = 1e-4  # part of the upper bound below which intervals are not divided
 
 
@@ -55,7 +59,8 @@ class Collapse(Told):
 
     lower: below it nothing moves; upper: there is no balance beyond it; both are proved.  r
     (nc, d): balance at `upper`; motion (n,): the proof that there is none beyond it, rates of
-    the unknowns; balanced: whether there is any balance without live load.
+    the unknowns; balanced: whether there is any balance without live load.  begins: bounds on
+    the load at which a motion that the live load drives can begin; None in 3D.
     """
 
     lower: float
@@ -66,6 +71,7 @@ class Collapse(Told):
     programs: int
     seconds: float
     reason: str
+    begins: Begins | None = None
 
     @property
     def width(self) -> float:
@@ -83,14 +89,16 @@ class Collapse(Told):
             "programs": self.programs, "seconds": self.seconds, "reason": self.reason,
             "r": None if self.r is None else self.r.tolist(),
             "motion": None if self.motion is None else self.motion.tolist(),
+            "begins": None if self.begins is None else self.begins.record,
         }  # fmt: skip
 
     def __str__(self) -> str:
         if not self.balanced:
             return f"no balance without live load: {self.reason}"
+        told = "" if self.begins is None else f" {self.begins}"
         return (
             f"nothing moves below {self.lower:.6g} times the live load, and there is no "
-            f"balance beyond {self.upper:.6g}. {self.reason}"
+            f"balance beyond {self.upper:.6g}.{told} {self.reason}"
         )
 
 
@@ -111,7 +119,7 @@ def collapse_load(
     live = finite("live", live, 1)
     expect_shape("live", live.shape, (problem.unknowns,))
     began, deadline = now(), deadline_of(time_limit, WORK)
-    blocks = _Blocks(problem, live)
+    blocks = _Blocks(problem, live, deadline)
     found = blocks.largest()
     if found is None:
         return Collapse(0.0, 0.0, None, None, False, 1, now() - began,
@@ -120,9 +128,13 @@ def collapse_load(
     if upper == np.inf:
         return Collapse(0.0, np.inf, None, None, True, 1, now() - began,
                         "Any live load is balanced.")  # fmt: skip
+    first = blocks.begins(upper, r)
     lower, reason = blocks.lower(upper, gap, deadline)
-    return Collapse(min(lower, upper) * blocks.factor, upper * blocks.factor, r, motion, True,
-                    blocks.programs, now() - began, reason)  # fmt: skip
+    lower, upper = min(lower, upper) * blocks.factor, upper * blocks.factor
+    if first is not None:  # what nothing begins below, the live load does not begin either
+        first = replace(first, lower=min(max(first.lower, lower), first.upper))
+    return Collapse(lower, upper, r, motion, True, blocks.programs, now() - began, reason,
+                    first)  # fmt: skip
 
 
 class _Blocks:
@@ -132,7 +144,8 @@ class _Blocks:
     than what programs keep to, and would seem to be balanced whatever its factor.
     """
 
-    def __init__(self, problem: FrictionProblem, live: Array) -> None:
+    def __init__(self, problem: FrictionProblem, live: Array, deadline: Deadline) -> None:
+        self.deadline = deadline
         self.nc, self.d, self.mu = problem.contacts, problem.dimension, problem.mu
         H = sparse.csr_array(problem.H)
         modes = problem.loose_modes
@@ -172,6 +185,7 @@ class _Blocks:
         from scipy.optimize import linprog
 
         self.programs += 1
+        self.deadline.spend(lp_work(cone, self.G))
         m = self.nc * self.d
         none = sparse.csr_array((self.G.shape[0], extra))
         balance = sparse.hstack([self.G, self.live[:, None], none], format="csr")
@@ -198,6 +212,18 @@ class _Blocks:
         motion = w if self.modes is None else self.modes @ w
         r = self.size * found.x[:m].reshape(self.nc, self.d)
         return float(found.x[m]), r, motion
+
+    def begins(self, most: float, r: Array) -> Begins | None:
+        """Bounds on the load at which a motion begins that the live load drives, in 2D."""
+        if self.d != 2:
+            return None
+        plane = Assembly(self.G, self.dead, self.live, self.mu, self.face)
+        found = begins(plane, most, r / self.size, self.deadline.share(BEGINS))
+        found = replace(found, lower=found.lower * self.factor, upper=found.upper * self.factor)
+        if found.r is None or found.w is None:
+            return found
+        w = found.w if self.modes is None else self.modes @ found.w
+        return replace(found, r=found.r * self.size, w=w * (self.factor / self.size))
 
     def lower(self, upper: float, gap: float, deadline: Deadline) -> tuple[float, str]:
         """(the largest x up to which no motion can begin, what is to be said)."""

@@ -5,12 +5,15 @@ that is only nearly a solution may be far from the one that it will come to, man
 error; so what is compared are solutions: where the motions of two differ, both are solved
 again to a hundredth of the tolerance, and count as two where the difference stays.  No proof,
 neither of several (`all_solutions`, `existence` prove), nor of one where nothing is found
-(`uniqueness`).
+(`uniqueness`).  Only motions are compared: what the motion of the solution leaves open of its
+reactions is said beside, by a rank (`hyperstatic.freedom`), where that fits into a fifth of
+the solve.
 """
 
 from __future__ import annotations
 
-from typing import NamedTuple
+from collections.abc import Iterable
+from typing import NamedTuple, Self
 
 import numpy as np
 from numpy.typing import NDArray
@@ -18,10 +21,14 @@ from numpy.typing import NDArray
 from ...core.arrays import whole
 from ...core.errors import InvalidInput, shown
 from ...problem.friction import FrictionProblem
+from ...problem.law import Coulomb
 from ...problem.solution import FrictionSolution
 from ...solvers.contract import Iterate
 from ...solvers.driver import drive
 from ...solvers.sweeps.gauss_seidel import GaussSeidel
+from ..hyperstatic.face import size_of_motion
+from ..hyperstatic.freedom import Freedom, freedom_of
+from ..quick import operations_of, quick_deadline
 
 Array = NDArray[np.float64]
 SWEEPS = GaussSeidel(batch=20, momentum=True)
@@ -40,16 +47,40 @@ class Other(NamedTuple):
     contacts: int
 
 
+class Others(tuple[Other, ...]):
+    """Other solutions; reactions: what the given motion leaves open, None under other laws.
+
+    A tuple, which str() puts in words.
+    """
+
+    reactions: Freedom | None
+
+    def __new__(cls, found: Iterable[Other] = (), reactions: Freedom | None = None) -> Self:
+        """Of what was found."""
+        one = super().__new__(cls, found)
+        one.reactions = reactions
+        return one
+
+    def __str__(self) -> str:
+        told = "No other motion was found."
+        if self:
+            count = "Another motion was" if len(self) == 1 else f"{len(self)} motions were"
+            far = ", ".join(f"{one.distance:.2g}" for one in self)
+            told = f"{count} found, {far} of its size away."
+        return told if self.reactions is None else f"{told} {self.reactions}"
+
+
 def maybe_others(
     solution: FrictionSolution, *, starts: int = 3, seed: int = 0
-) -> tuple[Other, ...]:
+) -> Others:
     """Other solutions of the problem of a converged solution, found from some starts.
 
     The first start is no reaction at all, the others are random reactions in the cones, by
     `seed`; sweeps with momentum go on from each, at most about ten times the iterations of the
     solution.  () says only that these starts have found no other.  Each costs about as much as
-    a solve, often less.  Raises InvalidInput for a solution that has not converged, or of no
-    FrictionProblem.
+    a solve, often less.  `reactions` of the answer says whether reactions of the solution's
+    motion are unique, and of how many contacts they are not.  Raises InvalidInput for a
+    solution that has not converged, or of no FrictionProblem.
     """
     problem = getattr(solution, "problem", None)
     if not isinstance(problem, FrictionProblem) or not solution.converged:
@@ -73,7 +104,11 @@ def maybe_others(
         known.append(found)
         differs = int((found.status != solution.status).sum())
         others.append(Other(found, distance(solution, found), differs))
-    return tuple(others)
+    reactions = None
+    if isinstance(problem.law, Coulomb):
+        spent = operations_of(solution.convergence)
+        reactions = freedom_of(problem, solution, quick_deadline(problem, spent))
+    return Others(others, reactions)
 
 
 def distance(one: FrictionSolution, other: FrictionSolution) -> float:
@@ -86,13 +121,20 @@ def _are_two(found: FrictionSolution, one: FrictionSolution) -> bool:
     """True where the motions of two solutions differ, and go on to when both are solved on."""
     tolerance = one.convergence.tolerance
     before = distance(found, one)
-    if not before > FAR * tolerance:
+    if not before > FAR * tolerance or _both_rest(found, one, FAR * tolerance):
         return False
     polished = [
         drive(x.problem, tolerance=POLISHED * tolerance, start=x, condense=True)
         for x in (found, one)
     ]
     return all(x.converged for x in polished) and distance(*polished) > STAYS * before
+
+
+def _both_rest(found: FrictionSolution, one: FrictionSolution, part: float) -> bool:
+    """Whether both motions are so small that they may be what rounding leaves of rest."""
+    assert isinstance(one.problem, FrictionProblem)
+    nothing = part * size_of_motion(one.problem, one)
+    return max(float(np.linalg.norm(x.u)) for x in (found, one)) <= nothing
 
 
 def _in_the_cones(solution: FrictionSolution, random: np.random.Generator) -> Array:

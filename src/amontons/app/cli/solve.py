@@ -10,8 +10,9 @@ from pathlib import Path
 
 import click
 
-from ...analysis.certificates.uniqueness import assess, operations_of, quick_verdict
+from ...analysis.certificates.uniqueness import assess, quick_verdict
 from ...analysis.certificates.verdict import Uniqueness
+from ...analysis.quick import operations_of
 from ...core.clock import TimeLimit
 from ...core.errors import FileFormatError, UnsupportedForm
 from ...core.files import put
@@ -121,7 +122,7 @@ def _verdict(
     if full:
         known = solution if solution.converged else None
         return assess(solution.problem, known, time_limit=time_limit)
-    return quick_verdict(solution.problem, operations_of(solution.convergence))
+    return quick_verdict(solution.problem, operations_of(solution.convergence), solution)
 
 
 def _report(result: output.Output, full: bool, folder: Path) -> None:

@@ -8,7 +8,8 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from ...analysis.certificates.uniqueness import operations_of, quick_verdict
+from ...analysis.certificates.uniqueness import quick_verdict
+from ...analysis.quick import operations_of
 from ...mechanics.steps import TimeStep
 from ...problem.friction import FrictionProblem
 from ...problem.solution import FrictionSolution
@@ -52,7 +53,7 @@ def solve_page(output: Output, units: Units, title: str = "") -> Page:
         charts.insert(0, reaction_chart(found))
     verdict = output.uniqueness
     if verdict is None and isinstance(found.problem, FrictionProblem):
-        verdict = quick_verdict(found.problem, operations_of(record))
+        verdict = quick_verdict(found.problem, operations_of(record), found)
     return Page(
         "solve", title or output.title or found.problem.name or "friction problem",
         headline=_counted(found),
