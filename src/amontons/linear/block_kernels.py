@@ -13,7 +13,7 @@ WELL_CONDITIONED = 1e-6  # |det A| / max|A|^3 from which A^-1 loses no digits th
 TURNS = 12  # of Jacobi's method at most; three or four do
 ALIKE = 1e-17  # entry beside the diagonal, relative to it, that is none
 NEXT, AFTER = (1, 2, 0), (2, 0, 1)  # of the three axes
-# Share of the blocks of W that are stored from which products take them by full rows, and of how
+# Share of the blocks of W that are stored from which products take them by full rows, and how
 # many contacts: fewer have nothing to gain, the rows of more leave the cache.
 FULL, FEWEST, MOST = 0.6, 12, 1000
 

@@ -67,7 +67,7 @@ class BlockRows(KeepsLocks):
 
     @cached_property
     def rows(self) -> Array:
-        """What products with W read: where it is nearly full its rows, (nc, 3, 3 nc), else data.
+        """What products with W read: of a nearly full one its rows, (nc, 3, 3 nc), else data.
 
         A contiguous row takes half the time of its blocks, of few contacts a quarter.
         """

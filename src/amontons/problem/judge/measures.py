@@ -140,7 +140,8 @@ def natural_error(indptr, indices, data, q, kind, parameters, rho, r):
     """Euclidean norm of the scaled natural map, unit of u, with u = W r + q formed here.
 
     Rows of 3x3 blocks, or in their place `BlockRows.rows`; q, r (nc, 3); kind and parameters of
-    the law (`law.law`); rho (nc,), 0 where a contact can not react.  Not a number in r gives infinity, never a small error.
+    the law (`law.law`); rho (nc,), 0 where a contact can not react.  Not a number in r gives
+    infinity, never a small error.
     """
     if _all_zero(r):
         return _error_at_rest(q, kind, parameters, rho)

@@ -235,8 +235,8 @@ def solve_eliminated(e, A, b0, b1, b2, mu, g1, g2):  # noqa: PLR0913
     """(r_N, r_T1, r_T2) under Coulomb friction, as `solve_coulomb` but quicker.
 
     e is the contact's row of `BlockRows.eliminated`; what it does not settle goes to
-    `solve_coulomb`.  (g1, g2): r_T of the last sweep; one sweep after another comes to the exact
-    direction of slip, see `_slip_near`.
+    `solve_coulomb`.  (g1, g2): r_T of the last sweep; sweep by sweep the direction of slip
+    becomes exact, see `_slip_near`.
     """
     if b0 >= 0.0:
         return 0.0, 0.0, 0.0

@@ -73,9 +73,9 @@ def solve_range(  # noqa: PLR0913
 
     sizes (problems + 1, 3): contacts, blocks and numbers in full rows of W of all before a
     problem; limits (problems,): sweeps at most; goals: errors; weakest (problems,): error of a
-    contact beyond which the goal is made tighter, as the driver does.  data: arrays of all problems one behind the
-    other, a row of indptr more for each.  Fills r, u, kept (contacts, 3), status, sliding
-    (contacts,) and told (problems, 8), see the columns; errors unit of u.
+    contact beyond which the goal is made tighter, as the driver does.  data: arrays of all
+    problems one behind the other, a row of indptr more for each.  Fills r, u, kept (contacts,
+    3), status, sliding (contacts,) and told (problems, 8), see the columns; errors unit of u.
     """
     indptr, indices, blocks, full, q, kind, parameters, rho, diagonal, eliminated = data
     for p in range(first, last):
