@@ -13,6 +13,60 @@ WELL_CONDITIONED = 1e-6  # |det A| / max|A|^3 from which A^-1 loses no digits th
 TURNS = 12  # of Jacobi's method at most; three or four do
 ALIKE = 1e-17  # entry beside the diagonal, relative to it, that is none
 NEXT, AFTER = (1, 2, 0), (2, 0, 1)  # of the three axes
+# Share of the blocks of W that are stored from which products take them by full rows, and how
+# many contacts: fewer have nothing to gain, the rows of more leave the cache.
+FULL, FEWEST, MOST = 0.6, 12, 1000
+
+
+@njit(cache=True, error_model="numpy", nogil=True)
+def is_full(blocks, contacts):
+    """True where products with a W of so many stored blocks take it by full rows."""
+    return FEWEST <= contacts <= MOST and blocks >= FULL * contacts * contacts
+
+
+@njit(cache=True, error_model="numpy", nogil=True)
+def full_rows(indptr, indices, data):
+    """W by the rows of contacts, (nc, 3, 3 nc), with all its zeros."""
+    nc = len(indptr) - 1
+    rows = np.zeros((nc, 3, 3 * nc))
+    for i in range(nc):
+        for k in range(indptr[i], indptr[i + 1]):
+            j = 3 * indices[k]
+            for a in range(3):
+                for b in range(3):
+                    rows[i, a, j + b] = data[k, a, b]
+    return rows
+
+
+@njit(cache=True, error_model="numpy", fastmath={"contract", "reassoc", "nsz"}, nogil=True)
+def full_product(rows, i, r):
+    """Row i of `full_rows` times r (3 nc,); summed in any order, so that it is vectorised."""
+    u0 = u1 = u2 = 0.0
+    for k in range(len(r)):
+        u0 += rows[i, 0, k] * r[k]
+        u1 += rows[i, 1, k] * r[k]
+        u2 += rows[i, 2, k] * r[k]
+    return u0, u1, u2
+
+
+@njit(cache=True, error_model="numpy", fastmath={"contract"}, nogil=True)
+def velocity_of_rows_inplace(begin, end, indptr, indices, rows, q, r, u):  # noqa: PLR0913
+    """u = W r + q of contacts begin to end - 1; rows: `BlockRows.rows`, or its data."""
+    if rows.shape[2] > 3:
+        flat = r.reshape(r.size)
+        for i in range(begin, end):
+            u0, u1, u2 = full_product(rows, i, flat)
+            u[i, 0], u[i, 1], u[i, 2] = q[i, 0] + u0, q[i, 1] + u1, q[i, 2] + u2
+        return
+    for i in range(begin, end):
+        u0, u1, u2 = q[i, 0], q[i, 1], q[i, 2]
+        for k in range(uint64(indptr[i]), uint64(indptr[i + 1])):
+            j = uint64(indices[k])  # unsigned: no test for negative indices in the loop
+            r0, r1, r2 = r[j, 0], r[j, 1], r[j, 2]
+            u0 += rows[k, 0, 0] * r0 + rows[k, 0, 1] * r1 + rows[k, 0, 2] * r2
+            u1 += rows[k, 1, 0] * r0 + rows[k, 1, 1] * r1 + rows[k, 1, 2] * r2
+            u2 += rows[k, 2, 0] * r0 + rows[k, 2, 1] * r1 + rows[k, 2, 2] * r2
+        u[i, 0], u[i, 1], u[i, 2] = u0, u1, u2
 
 
 @njit(cache=True, error_model="numpy")

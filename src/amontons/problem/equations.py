@@ -71,16 +71,20 @@ class Equations(Matrices):
         b = self.blocks
         assert self.q is not None
         q = read_only(spatial(self.q))
-        kind, parameters = self.law.kind, self.law.parameters
-        return b.indptr, b.indices, b.data, q, kind, parameters, b.inverse_norms
+        law = self.law.kind, self.law.parameters
+        return b.indptr, b.indices, b.data, q, *law, b.inverse_norms
+
+    @cached_property
+    def product_data(self) -> tuple[Any, ...]:
+        """The same for kernels that multiply by W, which take `BlockRows.rows` for data."""
+        return *self.kernel_data[:2], self.blocks.rows, *self.kernel_data[3:]
 
     @cached_property
     def judge_flops(self) -> float:
         """Floating point operations of one judgement, 0 where they are not counted."""
         if self.form is Form.GLOBAL:
             return 0.0
-        each, own = JUDGE_FLOPS
-        return float(each * len(self.blocks.indices) + own * self.contacts)
+        return float(np.dot(JUDGE_FLOPS, (len(self.blocks.indices), self.contacts)))
 
     @cached_property
     def q_norm(self) -> float:
@@ -114,9 +118,8 @@ class Equations(Matrices):
     def velocity(self, r: Array) -> tuple[Array, Array | None]:
         """(u, v) of reactions r, (nc, d); v is None in the Delassus form."""
         if self.form is Form.DELASSUS:
-            indptr, indices, data, q = self.kernel_data[:4]
-            u = np.empty_like(q)
-            velocity_inplace(indptr, indices, data, q, spatial(r), u)
+            u = np.empty((self.contacts, 3))
+            velocity_inplace(*self.product_data[:4], spatial(r), u)
             return u[:, : self.dimension], None
         assert self.H is not None and self.f is not None
         v = self.solve_M(self.H @ r.ravel() + self.f)
@@ -290,7 +293,7 @@ class Equations(Matrices):
     @of_plain
     def assessed(self, r: Array) -> Assessed:
         """All that is asked of reactions that may have converged (Delassus form only)."""
-        return assessed(self.kernel_data, kernel_rows(r), self.floor, self.q_norm)
+        return assessed(self.product_data, kernel_rows(r), self.floor, self.q_norm)
 
     @cached_property
     def floor(self) -> Array:
@@ -304,10 +307,9 @@ class Equations(Matrices):
 
     def _exact_error(self, r: Array) -> float:
         rows = kernel_rows(r)
-        size = self.q_norm
-        if size == 0:
+        if self.q_norm == 0:
             return 0.0 if not rows.any() else np.inf
-        return judge.natural_error(*self.kernel_data, rows) / size
+        return judge.natural_error(*self.product_data, rows) / self.q_norm
 
     @np.errstate(over="ignore", invalid="ignore")
     def _residual_error(self, r: Array, v: Array) -> float:

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from scipy import sparse
 
-from amontons.linear.blocks import block_rows, spatial
+from amontons.linear.blocks import block_rows, spatial, velocity_inplace
 
 
 def dense(rows, d):
@@ -37,6 +37,29 @@ def test_a_planar_contact_gets_a_decoupled_second_tangent():
     assert block_rows(np.zeros((2, 2)), 2).diagonal_blocks[0, 2, 2] == 0  # can not react
     held = np.diag([1e-9, 0.0])  # in its own unit, whatever that is
     assert block_rows(held, 2).diagonal_blocks[0, 2, 2] == 1e-9
+
+
+@pytest.mark.parametrize("d", [2, 3])
+@pytest.mark.parametrize("stored", [1.0, 0.8])
+@pytest.mark.parametrize("as_sparse", [False, True])
+def test_rows_of_a_nearly_full_matrix(d, stored, as_sparse):
+    rng = np.random.default_rng(d)
+    W = rng.standard_normal((20, d, 20, d)) * (rng.random((20, 20)) < stored)[:, None, :, None]
+    W = W.reshape(20 * d, 20 * d)
+    W.flags.writeable = False
+    found = block_rows(sparse.csr_array(W) if as_sparse else W, d)
+    assert found.rows.shape == (20, 3, 60)
+    np.testing.assert_array_equal(found.rows.reshape(20, 3, 20, 3), dense(found, d)[1])
+    q, r, by_rows, by_blocks = rng.standard_normal((4, 20, 3))
+    velocity_inplace(found.indptr, found.indices, found.rows, q, r, by_rows)
+    velocity_inplace(found.indptr, found.indices, found.data, q, r, by_blocks)
+    np.testing.assert_allclose(by_rows, by_blocks, atol=1e-13)
+
+
+def test_rows_are_blocks_where_few_are_stored_and_for_few_contacts():
+    for W in (sparse.eye_array(60, format="csr"), np.ones((9, 9))):
+        found = block_rows(W, 3)
+        assert found.rows is found.data
 
 
 def test_spatial_is_a_copy():

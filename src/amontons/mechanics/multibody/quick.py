@@ -257,7 +257,7 @@ def solved(  # noqa: PLR0913
     if not error <= goal:
         watch = np.array([goal, FIRST_JUDGED * goal, math.inf])
         s = Sweep(
-            indptr, indices, data, q, kind, parameters, rho, diagonal, eliminated,
+            indptr, indices, data, data, q, kind, parameters, rho, diagonal, eliminated,
             np.arange(n), EXACT, 1.0, CLOSE, 0, np.zeros(1),
         )  # fmt: skip
         done = sweeps_inplace(s, r, sweeps, watch)

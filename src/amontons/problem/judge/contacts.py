@@ -15,6 +15,7 @@ from numba import uint64
 from numpy.typing import NDArray
 
 from ...core.compiled import njit
+from ...linear.block_kernels import velocity_of_rows_inplace
 from ..law.law import BOUND, MU, TIED, TRESCA, given
 from ..law.states import OPEN, SLIP, STICK
 from .measures import EPSILON, PENETRATION, Weakest, contact_residual, hidden_square, ratio
@@ -55,6 +56,14 @@ def settled_contact(r0, r1, r2, u0, u1, u2, rho, kind, p):  # noqa: PLR0913
 def _pushes(indptr, indices, data, r, i):
     """sum_j |W_ij r_j|, unit of u: only of contacts that may be the weakest, for its roots."""
     total = 0.0
+    if data.shape[2] > 3:
+        for j in range(len(r)):
+            r0, r1, r2, c = r[j, 0], r[j, 1], r[j, 2], 3 * j
+            d0 = data[i, 0, c] * r0 + data[i, 0, c + 1] * r1 + data[i, 0, c + 2] * r2
+            d1 = data[i, 1, c] * r0 + data[i, 1, c + 1] * r1 + data[i, 1, c + 2] * r2
+            d2 = data[i, 2, c] * r0 + data[i, 2, c + 1] * r1 + data[i, 2, c + 2] * r2
+            total += math.sqrt(d0 * d0 + d1 * d1 + d2 * d2)
+        return total
     for k in range(uint64(indptr[i]), uint64(indptr[i + 1])):
         j = uint64(indices[k])
         r0, r1, r2 = r[j, 0], r[j, 1], r[j, 2]
@@ -77,17 +86,11 @@ def assess(  # noqa: PLR0913
     not r.
     """
     total, worst, contact, hidden, changed = 0.0, 0.0, -1, 0.0, False
+    velocity_of_rows_inplace(0, len(kind), indptr, indices, data, q, r, u)
     for i in range(len(kind)):
-        u0, u1, u2 = q[i, 0], q[i, 1], q[i, 2]
-        scale = floor[i] + math.sqrt(u0 * u0 + u1 * u1 + u2 * u2)
-        for k in range(uint64(indptr[i]), uint64(indptr[i + 1])):
-            j = uint64(indices[k])  # unsigned: no test for negative indices in the loop
-            r0, r1, r2 = r[j, 0], r[j, 1], r[j, 2]
-            u0 += data[k, 0, 0] * r0 + data[k, 0, 1] * r1 + data[k, 0, 2] * r2
-            u1 += data[k, 1, 0] * r0 + data[k, 1, 1] * r1 + data[k, 1, 2] * r2
-            u2 += data[k, 2, 0] * r0 + data[k, 2, 1] * r1 + data[k, 2, 2] * r2
-        u[i, 0], u[i, 1], u[i, 2] = u0, u1, u2
-        r0, r1, r2, p = r[i, 0], r[i, 1], r[i, 2], parameters[i]
+        scale = floor[i] + math.sqrt(q[i, 0] ** 2 + q[i, 1] ** 2 + q[i, 2] ** 2)
+        u0, u1, u2, p = u[i, 0], u[i, 1], u[i, 2], parameters[i]
+        r0, r1, r2 = r[i, 0], r[i, 1], r[i, 2]
         if rho[i] > 0.0:
             e0, e1, e2 = contact_residual(r0, r1, r2, u0, u1, u2, rho[i], kind[i], p)
             size = max(math.sqrt(e0 * e0 + e1 * e1 + e2 * e2), -PENETRATION * u0)

@@ -42,10 +42,10 @@ from enum import Enum
 from typing import NamedTuple
 
 import numpy as np
-from numba import uint64
 from numpy.typing import NDArray
 
 from ...core.compiled import njit
+from ...linear.block_kernels import velocity_of_rows_inplace
 from ..law.law import BOUND, MU, TIED, Law, given
 
 Array = NDArray[np.float64]
@@ -139,20 +139,16 @@ def _error_at_rest(q, kind, parameters, rho):
 def natural_error(indptr, indices, data, q, kind, parameters, rho, r):
     """Euclidean norm of the scaled natural map, unit of u, with u = W r + q formed here.
 
-    Rows of 3x3 blocks; q, r (nc, 3); kind and parameters of the law (`law.law`); rho (nc,), 0
-    where a contact can not react.  Not a number in r gives infinity, never a small error.
+    Rows of 3x3 blocks, or in their place `BlockRows.rows`; q, r (nc, 3); kind and parameters of
+    the law (`law.law`); rho (nc,), 0 where a contact can not react.  Not a number in r gives
+    infinity, never a small error.
     """
     if _all_zero(r):
         return _error_at_rest(q, kind, parameters, rho)
-    total = 0.0
+    total, u = 0.0, np.empty_like(q)
+    velocity_of_rows_inplace(0, len(kind), indptr, indices, data, q, r, u)
     for i in range(len(kind)):
-        u0, u1, u2 = q[i, 0], q[i, 1], q[i, 2]
-        for k in range(uint64(indptr[i]), uint64(indptr[i + 1])):
-            j = uint64(indices[k])  # unsigned: no test for negative indices in the loop
-            r0, r1, r2 = r[j, 0], r[j, 1], r[j, 2]
-            u0 += data[k, 0, 0] * r0 + data[k, 0, 1] * r1 + data[k, 0, 2] * r2
-            u1 += data[k, 1, 0] * r0 + data[k, 1, 1] * r1 + data[k, 1, 2] * r2
-            u2 += data[k, 2, 0] * r0 + data[k, 2, 1] * r1 + data[k, 2, 2] * r2
+        u0, u1, u2 = u[i, 0], u[i, 1], u[i, 2]
         if rho[i] > 0.0:
             e0, e1, e2 = contact_residual(
                 r[i, 0], r[i, 1], r[i, 2], u0, u1, u2, rho[i], kind[i], parameters[i]

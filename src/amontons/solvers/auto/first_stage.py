@@ -41,6 +41,7 @@ SHORT = 5e3  # nanoseconds of a sweep of a problem that is solved here whatever 
 COARSE, BLOCKS = 1e-4, 10_000  # tolerance from which, blocks of W to which larger ones are
 # Columns of what is told of a problem.
 SWEEPS, START, ERROR, WORST, CONTACT, HIDDEN, CHANGED, WORK = range(8)
+NO_NUMBERS = read_only(np.empty(0))
 
 
 def is_brief(problem: FrictionProblem, tolerance: float) -> bool:
@@ -70,32 +71,33 @@ def solve_range(  # noqa: PLR0913
 ):
     """Solve problems first to last - 1, from r; those that are not solved have error inf.
 
-    sizes (problems + 1, 2): contacts and blocks of all before a problem; limits (problems,):
-    sweeps at most; goals: errors; weakest (problems,): error of a contact beyond which the
-    goal is made tighter, as the driver does.  data: arrays of all problems one behind the
-    other, a row of indptr more for each.  Fills r, u, kept (contacts, 3), status, sliding
-    (contacts,) and told (problems, 8), see the columns; errors unit of u.
+    sizes (problems + 1, 3): contacts, blocks and numbers in full rows of W of all before a
+    problem; limits (problems,): sweeps at most; goals: errors; weakest (problems,): error of a
+    contact beyond which the goal is made tighter, as the driver does.  data: arrays of all
+    problems one behind the other, a row of indptr more for each.  Fills r, u, kept (contacts,
+    3), status, sliding (contacts,) and told (problems, 8), see the columns; errors unit of u.
     """
-    indptr, indices, blocks, q, kind, parameters, rho, diagonal, eliminated = data
+    indptr, indices, blocks, full, q, kind, parameters, rho, diagonal, eliminated = data
     for p in range(first, last):
         a, b, c, d = sizes[p, 0], sizes[p + 1, 0], sizes[p, 1], sizes[p + 1, 1]
-        goal, work = goals[p], np.zeros(1)
+        goal, work, nc = goals[p], np.zeros(1), b - a
+        by_rows = full[sizes[p, 2] : sizes[p + 1, 2]]
+        rows = by_rows.reshape(nc, 3, 3 * nc) if len(by_rows) else blocks[c:d]
         s = Sweep(
-            indptr[a + p : b + p + 1], indices[c:d], blocks[c:d], q[a:b], kind[a:b],
+            indptr[a + p : b + p + 1], indices[c:d], blocks[c:d], rows, q[a:b], kind[a:b],
             parameters[a:b], rho[a:b], diagonal[a:b], eliminated[a:b],
             visits(q[a:b], d - c), EXACT, 1.0, CLOSE, STEPS, work,
         )  # fmt: skip
-        x, nc = r[a:b], b - a
-        error = natural_error(s.indptr, s.indices, s.data, s.q, s.kind, s.parameters, s.rho, x)
+        x = r[a:b]
+        error = natural_error(s.indptr, s.indices, rows, s.q, s.kind, s.parameters, s.rho, x)
         told[p, SWEEPS], told[p, START], told[p, CHANGED] = 0.0, error, 0.0
         history = np.empty((2, DEPTH + 1, 3 * nc))
         gram, count = np.zeros((DEPTH + 1, DEPTH)), np.zeros(2, dtype=np.int64)
-        left = limits[p]
+        left, after = limits[p], x.copy()
         while True:
             if not error <= goal and left > 0:
                 watch = np.array([goal, FIRST_JUDGED * goal, math.inf])
-                gram[:], count[:] = 0.0, 0
-                done = anderson_inplace(s, x, x.copy(), history, gram, count, left, watch)
+                done = anderson_inplace(s, x, after, history, gram, count, left, watch)
                 left -= done
                 told[p, SWEEPS] += done
                 error = watch[2]
@@ -104,7 +106,7 @@ def solve_range(  # noqa: PLR0913
                 break
             while True:
                 found, worst, contact, hidden, changed = assess(
-                    s.indptr, s.indices, s.data, s.q, s.kind, s.parameters, s.rho, x,
+                    s.indptr, s.indices, rows, s.q, s.kind, s.parameters, s.rho, x,
                     floor[a:b], u[a:b], kept[a:b], status[a:b], sliding[a:b],
                 )  # fmt: skip
                 told[p, WORST], told[p, CONTACT], told[p, HIDDEN] = worst, contact, hidden
@@ -113,10 +115,16 @@ def solve_range(  # noqa: PLR0913
                 if not changed or not error <= goal:
                     break
                 told[p, CHANGED] = 1.0
-                x[:] = kept[a:b]
+                x[:] = after[:] = kept[a:b]
             if not worst > weakest[p] or left <= 0 or error == 0.0:
                 break
             goal = min(error * TIGHTER * weakest[p] / worst, TIGHTER * goal)
+
+
+def _full(problem: FrictionProblem) -> Array:
+    """Numbers of W by full rows, one behind the other; none of another W."""
+    blocks = problem.blocks
+    return blocks.rows.reshape(-1) if blocks.rows is not blocks.data else NO_NUMBERS
 
 
 def _joined(arrays: Sequence[NDArray]) -> NDArray:
@@ -128,7 +136,7 @@ def _joined(arrays: Sequence[NDArray]) -> NDArray:
 class Together:
     """Problems in Delassus form one behind the other, with room for what is found.
 
-    sizes (problems + 1, 2): contacts and blocks of all before a problem.
+    sizes (problems + 1, 3): contacts, blocks and numbers in full rows of all before a problem.
     """
 
     problems: Sequence[FrictionProblem]
@@ -138,17 +146,21 @@ class Together:
 
     def __post_init__(self) -> None:
         problems = self.problems
-        ends, limits = [(0, 0)], []
+        ends, limits = [(0, 0, 0)], []
         for p in problems:
             contacts, blocks = p.contacts, len(p.blocks.indices)
-            ends.append((ends[-1][0] + contacts, ends[-1][1] + blocks))
+            before, full = ends[-1], _full(p).size
+            ends.append((before[0] + contacts, before[1] + blocks, before[2] + full))
             limits.append(sweeps_of_first_chunks(blocks, contacts))
         self.sizes, self.limits = np.array(ends, np.int64), np.array(limits, np.int64)
         self.beyond = np.array(
             [self.weakest if is_brief(p, self.tolerance) else math.inf for p in problems]
         )
         self.norms = np.array([p.q_norm for p in problems])
-        kernels = [(*p.kernel_data, p.blocks.diagonal, p.blocks.eliminated) for p in problems]
+        kernels = [
+            (*p.kernel_data[:3], _full(p), *p.kernel_data[3:], p.blocks.diagonal,
+             p.blocks.eliminated) for p in problems
+        ]  # fmt: skip
         if len(kernels) == 1:
             self.data = kernels[0]
         else:

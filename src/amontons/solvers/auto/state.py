@@ -13,6 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...core.compiled import njit
+from ...linear.block_kernels import is_full
 from ...problem.friction import FrictionProblem
 from ...problem.judge.measures import natural_error
 from ...problem.law import Coulomb
@@ -27,6 +28,7 @@ Array = NDArray[np.float64]
 EXACT_WORK = 1e6  # products of blocks in an LU up to which an exact step costs no more
 # Nanoseconds measured on one core: only their ratios matter, and only roughly.
 SWEEP_BLOCK = 2.0
+FULL_BLOCK = 0.8  # of a W by full rows, `BlockRows.rows`
 SWEEP_CONTACT = 30.0
 HISTORY_CONTACT, DEEP_CONTACT = 35.0, 105.0
 MOMENTUM_CONTACT = 4.0
@@ -55,7 +57,8 @@ def visits(q: Array, blocks: int) -> NDArray[np.int64]:
 
 def nanoseconds_of_sweep(blocks: int, contacts: int, more: float = 0.0) -> float:
     """Cost of a sweep with so many stored blocks of W; more: per contact, for acceleration."""
-    return SWEEP_BLOCK * blocks + (SWEEP_CONTACT + more) * contacts
+    each = FULL_BLOCK if is_full(blocks, contacts) else SWEEP_BLOCK
+    return each * blocks + (SWEEP_CONTACT + more) * contacts
 
 
 @dataclass(eq=False)
@@ -160,7 +163,7 @@ class State:
 
     def judge(self, r: Array) -> float:
         """Error of r, (nc, 3), unit of u."""
-        return natural_error(*self.problem.kernel_data, r)
+        return natural_error(*self.problem.product_data, r)
 
     def offer(
         self, x: Array, iterations: int, stage: str, flops: float | None = None,

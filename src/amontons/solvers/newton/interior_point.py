@@ -37,7 +37,7 @@ from numpy.typing import NDArray
 from ...core.clock import NEVER, Deadline
 from ...core.compiled import njit
 from ...core.options import check_options
-from ...linear.blocks import velocity_of_rows_inplace
+from ...linear.block_kernels import velocity_of_rows_inplace
 from ...problem.friction import Form, FrictionProblem
 from ...problem.judge.measures import natural_error
 from ...problem.law.law import MU

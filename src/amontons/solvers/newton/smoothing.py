@@ -323,7 +323,7 @@ class Workspace:
 
     def error(self, r: Array) -> float:
         """The judge's residual before division by |q|, unit of u."""
-        return natural_error(*self.problem.kernel_data, r)
+        return natural_error(*self.problem.product_data, r)
 
     def sweeps(self, r: Array, count: int) -> None:
         """Gauss-Seidel sweeps on r in place, alternating direction."""

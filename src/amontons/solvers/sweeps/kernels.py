@@ -31,6 +31,7 @@ from numba import uint64
 from numpy.typing import NDArray
 
 from ...core.compiled import njit
+from ...linear.block_kernels import full_product
 from ...problem.equations import JUDGE_FLOPS
 from ...problem.friction import FrictionProblem
 from ...problem.judge.measures import natural_error
@@ -73,6 +74,7 @@ class Sweep(NamedTuple):
     indptr: Any
     indices: Any
     data: Any
+    rows: Any  # `BlockRows.rows`
     q: Any
     kind: Any
     parameters: Any
@@ -106,10 +108,9 @@ def sweep_data(
     visits, ends = np.arange(len(q)), np.empty(0)
     if order is SweepOrder.APPROACH:
         visits, ends = in_chunks(problem, by_approach(q))
-    work = np.concatenate([[0.0], ends])
     return Sweep(
-        b.indptr, b.indices, b.data, q, kind, parameters, rho, b.diagonal, b.eliminated,
-        visits, int(local), float(relaxation), float(close), int(steps), work,
+        b.indptr, b.indices, b.data, b.rows, q, kind, parameters, rho, b.diagonal, b.eliminated,
+        visits, int(local), float(relaxation), float(close), int(steps), np.append(0.0, ends),
     )  # fmt: skip
 
 
@@ -130,8 +131,7 @@ def flops_of_sweep(blocks: int, contacts: int, local: int = EXACT) -> float:
 
 def counted(s: Sweep, run: Callable[[], T]) -> tuple[T, float]:
     """What a call returns, sweeps made or (sweeps made, …), and their operations."""
-    before = float(s.work[0])
-    found = run()
+    before, found = float(s.work[0]), run()
     done = found[0] if isinstance(found, tuple) else found
     return found, sweep_flops(s, done, float(s.work[0]) - before)
 
@@ -154,21 +154,27 @@ def by_approach(q):
 @njit(cache=True, error_model="numpy", fastmath={"contract"}, nogil=True)
 def visit_inplace(s, first, last, backward, r):
     """Visit contacts, the first to the last - 1 in the order; returns their change squared."""
-    nc = len(s.order)
+    nc, full, flat = len(s.order), s.rows.shape[2] > 3, r.reshape(r.size)
     change = 0.0
     for step in range(first, last):
         i = uint64(s.order[nc - 1 - step if backward else step])
         b0, b1, b2 = s.q[i, 0], s.q[i, 1], s.q[i, 2]
-        for k in range(uint64(s.indptr[i]), uint64(s.indptr[i + uint64(1)])):
-            j = uint64(s.indices[k])  # unsigned: no test for negative indices in the loop
-            if j == i:
-                continue
-            r0, r1, r2 = r[j, 0], r[j, 1], r[j, 2]
-            b0 += s.data[k, 0, 0] * r0 + s.data[k, 0, 1] * r1 + s.data[k, 0, 2] * r2
-            b1 += s.data[k, 1, 0] * r0 + s.data[k, 1, 1] * r1 + s.data[k, 1, 2] * r2
-            b2 += s.data[k, 2, 0] * r0 + s.data[k, 2, 1] * r1 + s.data[k, 2, 2] * r2
         mu, r0, r1, r2 = s.parameters[i, MU], r[i, 0], r[i, 1], r[i, 2]
         A, e = s.data[uint64(s.diagonal[i])], s.eliminated[i]
+        if full:
+            u0, u1, u2 = full_product(s.rows, i, flat)
+            b0 += u0 - (A[0, 0] * r0 + A[0, 1] * r1 + A[0, 2] * r2)
+            b1 += u1 - (A[1, 0] * r0 + A[1, 1] * r1 + A[1, 2] * r2)
+            b2 += u2 - (A[2, 0] * r0 + A[2, 1] * r1 + A[2, 2] * r2)
+        else:
+            for k in range(uint64(s.indptr[i]), uint64(s.indptr[i + uint64(1)])):
+                j = uint64(s.indices[k])  # unsigned: no test for negative indices in the loop
+                if j == i:
+                    continue
+                x0, x1, x2 = r[j, 0], r[j, 1], r[j, 2]
+                b0 += s.data[k, 0, 0] * x0 + s.data[k, 0, 1] * x1 + s.data[k, 0, 2] * x2
+                b1 += s.data[k, 1, 0] * x0 + s.data[k, 1, 1] * x1 + s.data[k, 1, 2] * x2
+                b2 += s.data[k, 2, 0] * x0 + s.data[k, 2, 1] * x1 + s.data[k, 2, 2] * x2
         if s.local == EXACT:
             if s.kind[i] == COULOMB:
                 x0, x1, x2 = solve_eliminated(e, A, b0, b1, b2, mu, r1, r2)
@@ -207,7 +213,7 @@ def content(s, r, change, watch):
         return False
     if watch[0] > 0.0:
         s.work[0] += JUDGE_FLOPS[0] * len(s.indices) + JUDGE_FLOPS[1] * len(s.kind)
-    error = natural_error(s.indptr, s.indices, s.data, s.q, s.kind, s.parameters, s.rho, r)
+    error = natural_error(s.indptr, s.indices, s.rows, s.q, s.kind, s.parameters, s.rho, r)
     if error <= watch[0]:
         watch[2] = error
         return True
