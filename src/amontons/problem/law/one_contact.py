@@ -31,7 +31,6 @@ from .states import OPEN, SLIP, STICK
 
 NEWTON_STEPS = 12
 NEAR_STEPS = 8  # from the last direction of a sweep, before the careful search
-LEFT = 1e-6  # error of the direction, of what it turns, that a sweep may leave to the next one
 ANGLES = 16  # intervals of the circle searched when Newton fails: roots are at most four
 PROJECTIONS = 500  # of the last resort
 BISECTIONS = 55  # of such an interval: to the last bit
@@ -190,11 +189,7 @@ def solve_coulomb(A, b0, b1, b2, mu, g1, g2):  # noqa: PLR0913
 
 @njit(cache=True, error_model="numpy", fastmath={"contract"})
 def _slip_near(e, A, b0, b1, b2, mu, g1, g2):  # noqa: PLR0913
-    """(found, r_N, r_T1, r_T2): slip by Newton's method from the direction of (g1, g2).
-
-    Newton's error is about the square of its last step: it ends where that is a small part of
-    what the direction has turned here.  A direction that is exact already stays.
-    """
+    """(found, r_N, r_T1, r_T2): slip by Newton's method from the direction of (g1, g2)."""
     length = math.sqrt(g1 * g1 + g2 * g2)
     if length == 0.0:
         return False, 0.0, 0.0, 0.0
@@ -205,28 +200,24 @@ def _slip_near(e, A, b0, b1, b2, mu, g1, g2):  # noqa: PLR0913
     q21, q22 = load * e[14] - d1 * y2, load * e[15] - d2 * y2
     size = a * (abs(b1) + abs(b2)) - b0 * (abs(A[1, 0]) + abs(A[2, 0]))
     size += abs(d1 * b1) + abs(d2 * b2) - load * (abs(e[12]) + abs(e[15]))
-    c, s, turned = -g1 / length, -g2 / length, 0.0
+    c, s = -g1 / length, -g2 / length
     for _ in range(NEAR_STEPS):
         v1 = p1 + q11 * c + q12 * s
         v2 = p2 + q21 * c + q22 * s
         g = c * v2 - s * v1
         along = c * v1 + s * v2
-        there = abs(g) <= 1e-15 * size
-        if not there:
-            slope = s * s * q11 - s * c * (q12 + q21) + c * c * q22 - along
-            if not slope < 0.0 or abs(g) > -slope:
-                break
-            step = -g / slope
-            turn = 1.0 / math.sqrt(1.0 + step * step)
-            c, s = (c - s * step) * turn, (s + c * step) * turn
-            turned = max(turned, abs(step))
-            there = step * step <= LEFT * turned and along > abs(g)
-        if there:
+        if abs(g) <= 1e-15 * size:
             coupling = a - d1 * c - d2 * s
             if along < 0.0 or coupling <= ROUNDING * (a + abs(d1) + abs(d2)):
                 break
             r = -b0 / coupling
             return True, r, -mu * r * c, -mu * r * s
+        slope = s * s * q11 - s * c * (q12 + q21) + c * c * q22 - along
+        if not slope < 0.0 or abs(g) > -slope:
+            break
+        step = -g / slope
+        turn = 1.0 / math.sqrt(1.0 + step * step)
+        c, s = (c - s * step) * turn, (s + c * step) * turn
     return False, 0.0, 0.0, 0.0
 
 
@@ -235,8 +226,7 @@ def solve_eliminated(e, A, b0, b1, b2, mu, g1, g2):  # noqa: PLR0913
     """(r_N, r_T1, r_T2) under Coulomb friction, as `solve_coulomb` but quicker.
 
     e is the contact's row of `BlockRows.eliminated`; what it does not settle goes to
-    `solve_coulomb`.  (g1, g2): r_T of the last sweep; sweep by sweep the direction of slip
-    becomes exact, see `_slip_near`.
+    `solve_coulomb`.
     """
     if b0 >= 0.0:
         return 0.0, 0.0, 0.0
@@ -247,8 +237,6 @@ def solve_eliminated(e, A, b0, b1, b2, mu, g1, g2):  # noqa: PLR0913
         bound = mu * x0
         if x0 > 0.0 and x1 * x1 + x2 * x2 <= bound * bound:
             return x0, x1, x2
-        if g1 == 0.0 and g2 == 0.0:
-            g1, g2 = x1, x2
         found, x0, x1, x2 = _slip_near(e, A, b0, b1, b2, mu, g1, g2)
         if found:
             return x0, x1, x2
