@@ -98,7 +98,7 @@ def in_parts(model, processes):
     """The shares, K (n, n) and T (n, n) of all in PETSc's numbers."""
     given, owner = _made(model, processes)
     every = list(shares(given, owner, processes))
-    K = np.vstack([_rows(share)[0].toarray() for share in every])
+    K = np.vstack([_rows(share).toarray() for share in every])
     T = np.vstack([_basis(share, rank).toarray() for rank, share in enumerate(every)])
     return every, K, T
 
@@ -284,12 +284,15 @@ except am.InvalidInput as error:
 """
 
 FOLLOWED = """
-import amontons as am
-from amontons.linear.distributed import SpreadMatrix
+import numpy as np, amontons as am
+from amontons.linear.distributed import FAINT, SpreadMatrix
 plain, off = SpreadMatrix.solve, []
 def solve(self, b, reduction):
     x = plain(self, b, reduction)
-    pc, fine = self.ksp.getPC(), self.A
+    pc, fine = self.preconditioner, self.A.copy()
+    diagonal = fine.getDiagonal()
+    diagonal.array = np.where(self.held, FAINT * self.diagonal, diagonal.array)
+    fine.setDiagonal(diagonal)
     for k in range(pc.getMGLevels() - 1, 0, -1):
         fine = fine.PtAP(pc.getMGInterpolation(k))
         coarse = pc.getMGSmoother(k - 1).getOperators()[0].copy()
