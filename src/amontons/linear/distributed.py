@@ -209,6 +209,8 @@ class SpreadMatrix:
 
     def blocks(self, dofs: Index) -> Array:
         """K in the blocks of own unknowns dofs (k, d) that may be held, (k, d, d)."""
+        if not len(dofs):
+            return np.zeros((0, self.d, self.d))
         pointers, columns, values = self._pattern
         shape = (len(self.touched_rows), self.A.getSize()[1])
         rows = sparse.csr_array((values, columns, pointers), shape=shape)

@@ -281,6 +281,17 @@ try:
     am.distributed(make)
 except am.InvalidInput as error:
     print(error, flush=True)
+box, steel = am.box((1, 1, 1), cells=2), am.LinearElastic(young=200, poisson=0.3)
+above = am.Body(box, steel, "a")
+beside = am.Body(am.box((1, 1, 1), cells=2, origin=(9, 0, 0)), steel, "b")
+held = [am.Fix("a.top", (0, 0.01, -0.02)), am.Fix("b.top", (0, 0, 0))]
+floor = am.Contact("a.bottom", am.Plane(normal=(0, 0, 1)), mu=0.3)
+for contacts in ([], [floor]):  # the second process, which has body b, has none
+    solution = am.distributed(lambda: am.Model([above, beside], held, contacts))
+    solution.check()
+    assert sum(solution.counts.values()) == 9 * len(contacts)
+    expected = 0.012 * 200 if contacts else 0.0
+    print("solved" if (solution.resultant[2] > expected) == bool(contacts) else "wrong")
 """
 
 FOLLOWED = """
@@ -371,10 +382,11 @@ def _check_files(path, model, fields):
         assert (near & (force < 1e-7 * abs(reaction).max())).any(axis=1).all()
 
 
-def test_an_error_of_the_first_process_reaches_both(on_two):
+def test_an_error_reaches_both_and_parts_without_contacts_solve(on_two):
     done = on_two("-c", WRONG)
     assert done.returncode == 0, done.stderr
     assert done.stdout.count("no such mesh") == 2
+    assert done.stdout.count("solved") == 4
 
 
 def test_coarse_matrices_follow_the_contacts(on_two):

@@ -10,16 +10,14 @@ assembles and keeps its part, and together they run a semismooth Newton method
 
 from __future__ import annotations
 
-import traceback
-from collections.abc import Callable, Iterator
-from contextlib import contextmanager
-from typing import Any, TypeVar
+from collections.abc import Callable
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy import sparse
 
-from ...core.errors import AmontonsError, InvalidInput
+from ...core.errors import InvalidInput, MissingDependency
 from ...core.threads import asked, threads
 from ...linear.distributed import SpreadMatrix
 from ...linear.petsc import Petsc, mpi, petsc
@@ -29,10 +27,10 @@ from ..meshes.partition import partition
 from .cutting import Share, Whole, shares, whole
 from .model import Model
 from .spread_solution import DistributedSolution
+from .together import ended_together, together
 
 Array = NDArray[np.float64]
 Index = NDArray[np.int64]
-T = TypeVar("T")
 TOLERANCE = 1e-8
 
 
@@ -52,13 +50,16 @@ def distributed(
     not solve yet (bodies that contact alone holds, large strains, constraints, plastic flow),
     SingularOperator where multigrid does not converge, and what making the model raises.
     """
-    if not (isinstance(tolerance, float | int) and 0 < tolerance < 1):
-        raise InvalidInput(f"tolerance: expected a number between 0 and 1, got {tolerance!r}")
-    petsc()
+    try:
+        petsc()
+    except MissingDependency:
+        _check_options(tolerance, linear)
+        raise
     comm = mpi().COMM_WORLD if comm is None else comm
     if comm.size > 1 and not asked():
         threads(1)  # one core each
     with ended_together(comm):
+        together(comm, lambda: _check_options(tolerance, linear))
         share = _received(model, comm)
         rows = [together(comm, lambda: _rows(share))]
         problem = _problem(share, rows, comm, linear or Petsc())
@@ -68,41 +69,12 @@ def distributed(
         return solution
 
 
-class OnAll(Exception):
-    """An error that all processes know of, though it happened on one."""
-
-    def __init__(self, reason: Exception) -> None:
-        self.reason = reason
-        super().__init__(str(reason))
-
-
-@contextmanager
-def ended_together(comm: Any) -> Iterator[None]:
-    """End all processes when this one alone fails, as the others would wait for it for ever."""
-    try:
-        yield
-    except OnAll as known:
-        raise known.reason from None
-    except AmontonsError:  # of sums that all have alike
-        raise
-    except BaseException:
-        if comm.size > 1:
-            traceback.print_exc()
-            comm.Abort(1)
-        raise
-
-
-def together(comm: Any, work: Callable[[], T]) -> T:
-    """What `work` returns here; raises OnAll where it fails on any process, on all of them."""
-    error, out = None, None
-    try:
-        out = work()
-    except Exception as reason:
-        error = reason
-    errors = [e for e in comm.allgather(error) if e is not None]
-    if errors:
-        raise OnAll(errors[0])
-    return out  # type: ignore[return-value]  # work has returned it
+def _check_options(tolerance: float, linear: Petsc | None) -> None:
+    """Raise InvalidInput for what `distributed` can not take."""
+    if not (isinstance(tolerance, float | int) and 0 < tolerance < 1):
+        raise InvalidInput(f"tolerance: expected a number between 0 and 1, got {tolerance!r}")
+    if not isinstance(linear, Petsc | None):
+        raise InvalidInput(f"linear: expected Petsc(...), got {type(linear).__name__}")
 
 
 def _received(model: Model | Callable[[], Model], comm: Any) -> Share:
