@@ -4,8 +4,9 @@
 
 needs the extra `distributed` and mpirun, see docs/distributed.md.  A row is the cube of
 `examples/distributed.py` with so many cells an edge.  Waiting processes yield their core; on a
-machine with other load look at the CPU seconds, which contain less of the waiting.  The page is written after
-every row; with --resume its rows are kept and only missing ones run.  Tetrahedra with a million unknowns:
+machine with other load look at the CPU seconds, which contain less of the waiting.  The page is
+written after every row; with --resume its rows are kept and only missing ones run.
+Tetrahedra with a million unknowns:
 
     python benchmarks/processes.py --cells 32 48 69 --kinds tet --processes 1 2 4 --resume
 

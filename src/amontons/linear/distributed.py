@@ -7,10 +7,10 @@ contact has closed there,
 
     A = [K_FF, 0; 0, diag K_DD],    rows i of contacts that slide: sum_j G_r,ij K_jF + G_u,iF
 
-j the directions of the same node, and a FAINT part of diag K_DD where a support holds.  So it has the same pattern at all times, and is symmetric
-unless contacts slide.  What A has lost stands in the rows `touched` (k, n), a thin matrix with
-the rows that have an entry in the row or column of a direction that may ever be held: K x is
-A x with these rows taken from there.
+j the directions of the same node, and a FAINT part of diag K_DD where a support holds.  So it
+has the same pattern at all times, and is symmetric unless contacts slide.  What A has lost
+stands in the rows `touched` (k, n), a thin matrix with the rows that have an entry in the row
+or column of a direction that may ever be held: K x is A x with these rows taken from there.
 
 Flexible GMRES is preconditioned from the right by multigrid (GAMG).  Its aggregates are made
 once.  Its coarse matrices follow (`spread_levels`), and are made anew only when an iteration
@@ -68,15 +68,15 @@ class SpreadMatrix:
     """K on all processes of `comm`, its held directions and the solver of Newton's steps.
 
     rows: gives K of the own unknowns in blocks (own, n), columns in the numbers of PETSc,
-    where processes follow one another, and keeps no copy; basis: T = I + C (own, n) in which contact is seen on
-    one side, C C = 0, None where nobody has one (the same answer on all processes).
+    where processes follow one another, and keeps no copy; basis: T = I + C (own, n) in which
+    contact is seen on one side, C C = 0, None where nobody has one (the same on all processes).
     modes (own, k): rigid motions; d: unknowns a node; fixed, contact (own,): directions that
     supports hold, and those of contacts, whose rows and columns change from step to step.
     """
 
     def __init__(  # noqa: PLR0913  # what a matrix is made of
-        self, comm: Any, rows: Callable[[], sparse.bsr_array], basis: sparse.bsr_array | None, *,
-        modes: Array, d: int, fixed: Mask, contact: Mask, options: Petsc,
+        self, comm: Any, rows: Callable[[], sparse.bsr_array], basis: sparse.bsr_array | None,
+        *, modes: Array, d: int, fixed: Mask, contact: Mask, options: Petsc,
     ) -> None:  # fmt: skip
         self.comm, self.d, self.options = comm, d, options
         self.own, self.directions = len(fixed), int(comm.allreduce(int(contact.sum())))
@@ -235,7 +235,8 @@ class SpreadMatrix:
         self.A.assemble()
         slots = self._changing[0]
         self._values = values[slots]
-        self._below = np.where(mine[slots], FAINT * self.diagonal[self._of[slots]], self._values)
+        faint = FAINT * self.diagonal[self._of[slots]]
+        self._below = np.where(mine[slots], faint, self._values)
         self._changed = float(self.total(int((held != self._built).sum())))
 
     def _let_slide(self, values: Array, free: Array, sliding: Sliding) -> None:

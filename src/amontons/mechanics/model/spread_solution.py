@@ -127,7 +127,7 @@ class DistributedSolution:
 
         Of nodes: displacement, contact_force (on slaves, global axes), contact_status (0 open
         or no contact, 1 sticks, 2 slips), reaction (force of supports), von_mises, unit of
-        stress.  Raises, on all, InvalidInput for another suffix, and what writing a part raises.
+        stress.  Raises on all InvalidInput for another suffix, and what writing a part raises.
         """
         path = Path(path)
         if path.suffix != ".pvtu":

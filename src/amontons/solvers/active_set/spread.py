@@ -248,9 +248,10 @@ class SpreadActiveSet:
         both = wanted[:, :, None] & wanted[:, None, :]
         d = wanted.shape[1]
         block = np.einsum("kij,kjl->kil", given.G_r, self.block) + given.G_u
-        inverse = np.linalg.inv(np.where(both, block, np.eye(d) * (~wanted)[:, :, None]))
+        others = np.eye(d) * (~wanted)[:, :, None]
+        inverse = np.linalg.inv(np.where(both, block, others))
         diagonal = np.diagonal(self.block, axis1=1, axis2=2)
-        scale = np.where(both, inverse * diagonal[:, :, None], np.eye(d) * (~wanted)[:, :, None])
+        scale = np.where(both, inverse * diagonal[:, :, None], others)
         G_r, G_u = (np.einsum("kij,kjl->kil", scale, G) for G in (given.G_r, given.G_u))
         return replace(given, G_r=G_r, G_u=G_u, b=np.einsum("kij,kj->ki", scale, given.b))
 
