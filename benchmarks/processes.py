@@ -4,7 +4,13 @@
 
 needs the extra `distributed` and mpirun, see docs/distributed.md.  A row is the cube of
 `examples/distributed.py` with so many cells an edge.  Waiting processes yield their core; on a
-machine with other load look at the CPU seconds, which contain less of the waiting.
+machine with other load look at the CPU seconds, which contain less of the waiting.  The page is
+written after every row; with --resume its rows are kept and only missing ones run.
+Tetrahedra with a million unknowns:
+
+    python benchmarks/processes.py --cells 32 48 69 --kinds tet --processes 1 2 4 --resume
+
+of which every run ends after --seconds, or when a process asks for more than --megabytes.
 """
 
 import argparse
@@ -88,19 +94,20 @@ def together(kind, cells, tolerance):
     }  # fmt: skip
 
 
-def measured(kind, cells, processes, tolerance):
+def measured(kind, cells, processes, given):
     """A row: what one run has used; processes: None for one without PETSc."""
     load = os.getloadavg()[0]
     mine = [sys.executable, __file__, "--worker", kind, str(cells)]
-    mine += ["--tolerance", str(tolerance)]
+    mine += ["--tolerance", str(given.tolerance), "--megabytes", str(given.megabytes)]
     with tempfile.TemporaryDirectory() as folder:
         log = Path(folder) / "log"
         env = {**os.environ, **MPI, "PETSC_OPTIONS": f"-log_view :{log}"}
         command = [*mine, "--alone"] if processes is None else [
             "mpirun", "--oversubscribe", "-n", str(processes), *mine]  # fmt: skip
-        done = subprocess.run(command, env=env, capture_output=True, text=True, timeout=3600)
+        done = subprocess.run(command, env=env, capture_output=True, text=True,
+                              timeout=given.seconds)  # fmt: skip
         if done.returncode:
-            raise SystemExit(done.stderr)
+            raise RuntimeError(done.stderr)
         found = json.loads(done.stdout.strip().splitlines()[-1])
         text = log.read_text() if log.exists() else ""
     names = ("MPI Msg Count", "MPI Msg Len \\(bytes\\)", "MPI Reductions")
@@ -131,25 +138,52 @@ def main():
     parser.add_argument("--kinds", nargs="+", default=["hex", "tet"])
     parser.add_argument("--processes", type=int, nargs="+", default=[1, 2, 4])
     parser.add_argument("--tolerance", type=float, default=1e-8)
+    parser.add_argument("--seconds", type=float, default=3600.0)
+    parser.add_argument("--megabytes", type=int, default=16_000, help="of one process")
+    parser.add_argument("--resume", action="store_true")
     parser.add_argument("--worker", nargs=2)
     parser.add_argument("--alone", action="store_true")
     given = parser.parse_args()
     if given.worker:
         kind, cells = given.worker[0], int(given.worker[1])
+        most = given.megabytes * 2**20
+        resource.setrlimit(resource.RLIMIT_DATA, (most, most))
         found = (alone if given.alone else together)(kind, cells, given.tolerance)
         if found is not None:
             print(json.dumps(found))
         return
-    lines = ["| " + " | ".join(COLUMNS) + " |", "|" + "---|" * len(COLUMNS)]
+    known = kept_rows() if given.resume else {}
     for kind in given.kinds:
         for cells in given.cells:
             for processes in (None, *given.processes):
-                result = measured(kind, cells, processes, given.tolerance)
-                lines.append(row(kind, cells, processes, result))
-                print(lines[-1], flush=True)
+                key = kind, str(cells), str(processes or "without PETSc")
+                if key in known:
+                    continue
+                try:
+                    line = row(kind, cells, processes, measured(kind, cells, processes, given))
+                except (RuntimeError, subprocess.TimeoutExpired) as ended:
+                    print(f"{key}: {ended}", file=sys.stderr, flush=True)
+                    continue
+                known[key] = line
+                print(line, flush=True)
+                write_page(known.values())
+
+
+def kept_rows():
+    """Rows of the page by kind, cells and processes."""
+    lines = PAGE.read_text().splitlines() if PAGE.exists() else []
+    cells = [[part.strip() for part in line.split("|")[1:-1]] for line in lines]
+    return {
+        (part[0], part[1], part[4]): line for part, line in zip(cells, lines, strict=True)
+        if len(part) == len(COLUMNS) and part[0] in ("hex", "tet")
+    }  # fmt: skip
+
+
+def write_page(rows):
+    """The page of these rows."""
     command = "python benchmarks/processes.py " + " ".join(sys.argv[1:])
     machine = ", ".join(f"{name} {value}" for name, value in describe().items())
-    table = "\n".join(lines)
+    table = "\n".join(["| " + " | ".join(COLUMNS) + " |", "|" + "---|" * len(COLUMNS), *rows])
     text = f"# Processes\n\nRegenerate: `{command}`.  {machine}.\n\n{WORDS}\n\n{table}"
     PAGE.write_text(text + "\n")
 

@@ -7,18 +7,27 @@ contact has closed there,
 
     A = [K_FF, 0; 0, diag K_DD],    rows i of contacts that slide: sum_j G_r,ij K_jF + G_u,iF
 
-j the directions of the same node.  So it has the same pattern at all times, and is symmetric
-unless contacts slide.  What A has lost stands in the rows `touched` (k, n), a thin matrix with
-the rows that have an entry in the row or column of a direction that may ever be held: K x is
-A x with these rows taken from there.
+j the directions of the same node, and a FAINT part of diag K_DD where a support holds.  So it
+has the same pattern at all times, and is symmetric unless contacts slide.  What A has lost
+stands in the rows `touched` (k, n), a thin matrix with the rows that have an entry in the row
+or column of a direction that may ever be held: K x is A x with these rows taken from there.
 
-GMRES is preconditioned from the right by multigrid (GAMG).  Its aggregates are made once.  Its
-coarse matrices follow (`spread_levels`), and are made anew only when an iteration gains far
-less than it did; another preconditioner also when many directions have changed.
+Flexible GMRES is preconditioned from the right by multigrid (GAMG).  Its aggregates are made
+once.  Its coarse matrices follow (`spread_levels`), and are made anew only when an iteration
+gains far less than it did; another preconditioner also when many directions have changed.
+
+Coarse functions are cut off at held directions, as in truncated multigrid [KK]: coarse matrices
+are P' A P with the FAINT diagonal in all of D, and what a cycle gives to D is dropped.  With
+the whole diagonal a coarse function would cost energy for what is cut off anyway, and near
+contacts multigrid would do little.
+
+[KK] R. Kornhuber, R. Krause, "Adaptive multigrid methods for Signorini's problem in linear
+elasticity", Comput. Visual. Sci. 4 (2001).
 """
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any
 
@@ -28,7 +37,7 @@ from scipy import sparse
 
 from ..core.errors import SingularOperator
 from .petsc import PREFIX, Petsc, petsc
-from .spread_levels import FollowingLevels, small_products
+from .spread_levels import FollowingLevels, chosen_products
 
 Array = NDArray[np.float64]
 Index = NDArray[np.int64]
@@ -36,7 +45,8 @@ Mask = NDArray[np.bool_]
 RESTART = 30  # vectors that GMRES keeps
 CHANGED = 0.2  # share of the contact directions that may change before multigrid follows
 WORSE = 3.0  # iterations per digit, compared with those of fresh coarse matrices
-SLAB = 20_000  # nodes whose rows are handed over at a time
+SLAB = 2_000  # nodes whose rows are handed over at a time
+FAINT = 1e-6  # of the diagonal: keeps a coarse matrix regular whose functions are all cut off
 FIRST_WORSE = 8.0  # iterations per digit that are called bad whatever they were
 
 
@@ -57,20 +67,20 @@ class Sliding:
 class SpreadMatrix:
     """K on all processes of `comm`, its held directions and the solver of Newton's steps.
 
-    rows: K of the own unknowns in blocks (own, n), columns in the numbers of PETSc,
-    where processes follow one another; basis: T = I + C (own, n) in which contact is seen on
-    one side, C C = 0, None where nobody has one (the same answer on all processes).
+    rows: gives K of the own unknowns in blocks (own, n), columns in the numbers of PETSc,
+    where processes follow one another, and keeps no copy; basis: T = I + C (own, n) in which
+    contact is seen on one side, C C = 0, None where nobody has one (the same on all processes).
     modes (own, k): rigid motions; d: unknowns a node; fixed, contact (own,): directions that
     supports hold, and those of contacts, whose rows and columns change from step to step.
     """
 
     def __init__(  # noqa: PLR0913  # what a matrix is made of
-        self, comm: Any, rows: sparse.bsr_array, basis: sparse.bsr_array | None, *,
-        modes: Array, d: int, fixed: Mask, contact: Mask, options: Petsc,
+        self, comm: Any, rows: Callable[[], sparse.bsr_array], basis: sparse.bsr_array | None,
+        *, modes: Array, d: int, fixed: Mask, contact: Mask, options: Petsc,
     ) -> None:  # fmt: skip
         self.comm, self.d, self.options = comm, d, options
         self.own, self.directions = len(fixed), int(comm.allreduce(int(contact.sum())))
-        self.A = _matrix(comm, rows, d)
+        self.A = _matrix(comm, rows(), d)
         self.T = None
         if basis is not None:
             self.T = _matrix(comm, basis, d)
@@ -83,10 +93,12 @@ class SpreadMatrix:
         self._x, self._y = self.A.createVecs()
         self.A.getDiagonal(self._x)
         self.diagonal = self._x.array_r.copy()
+        self._in_matrix = np.where(fixed, FAINT, 1.0) * self.diagonal
         self._take_rows(fixed | contact, contact)
         self._give_modes(modes)
         self.held = np.zeros(self.own, dtype=bool)
         self.ksp: Any = None
+        self.preconditioner: Any = None
         self.levels: FollowingLevels | None = None
         self._fresh = True
         self.iterations = self.rebuilt = 0
@@ -95,8 +107,8 @@ class SpreadMatrix:
 
     def destroy(self) -> None:
         """Give the memory back; all processes have to, and have no use of this object then."""
-        for part in (self.levels, self.ksp, self.A, self.T, self.touched, self._fetch,
-                     self._near, self._x, self._y, self._rest):  # fmt: skip
+        for part in (self.levels, self.ksp, self.preconditioner, self.A, self.T, self.touched,
+                     self._fetch, self._near, self._x, self._y, self._rest):  # fmt: skip
             if part is not None:
                 part.destroy()
 
@@ -150,10 +162,10 @@ class SpreadMatrix:
         self._rest = self.touched.createVecLeft()
         pointers, columns, values = self.touched.getValuesCSR()
         self._pattern = pointers, columns, values
-        self._of = np.repeat(touched, np.diff(pointers))
+        self._of = np.repeat(touched.astype(np.int32), np.diff(pointers))
         self._on_diagonal = columns == self.first + self._of
         known, place = np.unique(columns, return_inverse=True)
-        self._place = place.ravel()
+        self._place = place.ravel().astype(np.int32)
         self._near = PETSc.Vec().createSeq(len(known))
         self._fetch = PETSc.Scatter().create(
             flags, PETSc.IS().createGeneral(known.astype(PETSc.IntType), comm=self.comm),
@@ -197,13 +209,15 @@ class SpreadMatrix:
 
     def blocks(self, dofs: Index) -> Array:
         """K in the blocks of own unknowns dofs (k, d) that may be held, (k, d, d)."""
+        if not len(dofs):
+            return np.zeros((0, self.d, self.d))
         pointers, columns, values = self._pattern
         shape = (len(self.touched_rows), self.A.getSize()[1])
         rows = sparse.csr_array((values, columns, pointers), shape=shape)
         at = np.searchsorted(self.touched_rows, dofs)
         d = dofs.shape[1]
         i, j = np.repeat(at, d, axis=1).ravel(), np.tile(dofs + self.first, (1, d)).ravel()
-        return np.asarray(rows[i, j]).reshape(-1, d, d)
+        return np.asarray(rows[i, j]).reshape(len(dofs), d, d)
 
     def hold(self, held: Mask, sliding: Sliding) -> None:
         """Hold own directions (own,), and let contacts slide by their conditions."""
@@ -212,14 +226,17 @@ class SpreadMatrix:
         free = np.where(self._fetched(held)[self._place], 0.0, values)  # columns
         values = np.where(held[self._of], 0.0, free)
         mine = self._on_diagonal & held[self._of]
-        values[mine] = self.diagonal[self._of[mine]]
+        values[mine] = self._in_matrix[self._of[mine]]
         self.held = held
         self._let_slide(values, free, sliding)
         index = (self.first + self.touched_rows).astype(PETSc.IntType)
         if len(index):
             self.A.setValuesIJV(pointers, columns, values, rowmap=index)
         self.A.assemble()
-        self._values = values[self._changing[0]]
+        slots = self._changing[0]
+        self._values = values[slots]
+        faint = FAINT * self.diagonal[self._of[slots]]
+        self._below = np.where(mine[slots], faint, self._values)
         self._changed = float(self.total(int((held != self._built).sum())))
 
     def _let_slide(self, values: Array, free: Array, sliding: Sliding) -> None:
@@ -283,17 +300,19 @@ class SpreadMatrix:
     def _prepare(self) -> None:
         """Make the solver, or let multigrid follow the matrix, anew where it is time to."""
         if self.ksp is None:
-            self.ksp = krylov_of_steps(self.A)
+            self.preconditioner = preconditioner(self.A)
+            self.ksp = krylov_of_steps(self.A, OfFree(self))
             self._fresh = True
         else:
             many = self.levels is None and self._changed > CHANGED * self.directions
             self._fresh = many or self._stale
-            self.ksp.getPC().setReusePreconditioner(not self._fresh)
+            self.preconditioner.setReusePreconditioner(not self._fresh)
+            self.preconditioner.setOperators(self.A)
             self.ksp.setOperators(self.A)
         if self._fresh:
             self._make_levels()
-        elif self.levels is not None:
-            self.levels.follow(self._values)
+        if self.levels is not None:
+            self.levels.follow(self._below)
 
     def _make_levels(self) -> None:
         """Multigrid of the matrix as it is now, or what else the preconditioner is."""
@@ -301,27 +320,52 @@ class SpreadMatrix:
         self._built = self.held.copy()
         if self.levels is not None:
             self.levels.destroy()
-        with small_products(self.comm):
-            self.ksp.setUp()
-        pc = self.ksp.getPC()
+        pc = self.preconditioner
+        with chosen_products(self.comm):
+            pc.setUp()
         if pc.getType() == "gamg":
             self.levels = FollowingLevels(pc, self.A, *self._changing[1], self._values)
 
 
-def krylov_of_steps(A: Any) -> Any:
-    """GMRES with multigrid whose aggregates are kept."""
+class OfFree:
+    """A preconditioner, as PETSc calls it, that leaves held directions at zero."""
+
+    def __init__(self, matrix: SpreadMatrix) -> None:
+        self.matrix = matrix
+
+    def apply(self, _: Any, x: Any, y: Any) -> None:
+        """Put the preconditioner of x into y."""
+        self.matrix.preconditioner.apply(x, y)
+        y.array[self.matrix.held] = 0.0
+
+
+def preconditioner(A: Any) -> Any:
+    """Multigrid whose aggregates are kept, or what else the options ask for; not yet set up."""
     PETSc = petsc()
     options = PETSc.Options()
     name = PREFIX + "pc_gamg_reuse_interpolation"
     if not options.hasName(name):
         options.setValue(name, True)
+    pc = PETSc.PC().create(A.getComm())
+    pc.setOperators(A)
+    pc.setType("gamg")
+    pc.setOptionsPrefix(PREFIX)
+    pc.setFromOptions()
+    return pc
+
+
+def krylov_of_steps(A: Any, given: OfFree) -> Any:
+    """Flexible GMRES, which spares a last call of the preconditioner, one of some five."""
+    PETSc = petsc()
     ksp = PETSc.KSP().create(A.getComm())
     ksp.setOperators(A)
-    ksp.setType("gmres")
-    ksp.setPCSide(PETSc.PC.Side.RIGHT)
+    ksp.setType("fgmres")
     ksp.setGMRESRestart(RESTART)
-    ksp.getPC().setType("gamg")
     ksp.setOptionsPrefix(PREFIX)
+    pc = ksp.getPC()
+    pc.setType("python")
+    pc.setPythonContext(given)
+    pc.setOptionsPrefix(PREFIX + "free_")  # options of the preconditioner are the other's
     ksp.setFromOptions()
     return ksp
 

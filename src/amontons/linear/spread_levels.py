@@ -11,6 +11,7 @@ eigenvalues that Chebyshev's smoother works with, stay those of the step that ha
 
 from __future__ import annotations
 
+import ctypes
 from collections.abc import Iterator
 from contextlib import contextmanager
 from typing import Any
@@ -49,6 +50,8 @@ class FollowingLevels:
         below = range(finest - 1, -1, -1)
         self._coarse = [pc.getMGSmoother(k).getOperators()[0] for k in below]
         self._products: list[Any] = [None] * finest
+        for coarse in self._coarse:
+            _forget_product(coarse)
 
     def follow(self, values: Array) -> None:
         """Let the levels be those of A with other entries in the rows."""
@@ -56,8 +59,10 @@ class FollowingLevels:
         self._change.setValuesCSR(*self._csr, values - self._values)
         self._change.assemble()
         self._values = values
+        if not self._change.norm():
+            return
         change, subset = self._change, PETSc.Mat.Structure.SUBSET_NONZERO_PATTERN
-        with small_products(change.getComm()):
+        with chosen_products(change.getComm(), alone="scalable"):
             for k, (P, A) in enumerate(zip(self._down, self._coarse, strict=True)):
                 change = self._products[k] = change.PtAP(P, self._products[k])
                 A.axpy(1.0, change, subset)
@@ -69,16 +74,28 @@ class FollowingLevels:
                 part.destroy()
 
 
-@contextmanager
-def small_products(comm: Any) -> Iterator[None]:
-    """Let PETSc make P' A P of spread matrices row by row, without A P between.
+def _forget_product(A: Any) -> None:
+    """Free what PETSc has kept in a product for making it again: A P, and rows of others' P.
 
-    A P takes the room of A and more; without it a product takes about twice as long.
+    petsc4py has no method for MatProductClear; its module is linked against PETSc.
+    """
+    clear = ctypes.PyDLL(petsc().__file__).MatProductClear
+    clear.argtypes, clear.restype = [ctypes.c_void_p], ctypes.c_int
+    if clear(A.handle):
+        raise RuntimeError("PETSc: MatProductClear has failed")
+
+
+@contextmanager
+def chosen_products(comm: Any, alone: str = "rap") -> Iterator[None]:
+    """Let PETSc make P' A P by A P on one process, row by row where the matrix is spread.
+
+    A P takes the room of A and more, for a while.  Without it a product takes longer: half as
+    long again on one process, twice on several.  alone: PETSc's name of the way on one.
     """
     options, name = petsc().Options(), "matptap_via"
-    ours = comm.size > 1 and not options.hasName(name)
+    ours = not options.hasName(name)
     if ours:
-        options.setValue(name, "allatonce_merged")
+        options.setValue(name, "allatonce_merged" if comm.size > 1 else alone)
     try:
         yield
     finally:

@@ -98,7 +98,7 @@ def in_parts(model, processes):
     """The shares, K (n, n) and T (n, n) of all in PETSc's numbers."""
     given, owner = _made(model, processes)
     every = list(shares(given, owner, processes))
-    K = np.vstack([_rows(share)[0].toarray() for share in every])
+    K = np.vstack([_rows(share).toarray() for share in every])
     T = np.vstack([_basis(share, rank).toarray() for rank, share in enumerate(every)])
     return every, K, T
 
@@ -281,15 +281,29 @@ try:
     am.distributed(make)
 except am.InvalidInput as error:
     print(error, flush=True)
+box, steel = am.box((1, 1, 1), cells=2), am.LinearElastic(young=200, poisson=0.3)
+above = am.Body(box, steel, "a")
+beside = am.Body(am.box((1, 1, 1), cells=2, origin=(9, 0, 0)), steel, "b")
+held = [am.Fix("a.top", (0, 0.01, -0.02)), am.Fix("b.top", (0, 0, 0))]
+floor = am.Contact("a.bottom", am.Plane(normal=(0, 0, 1)), mu=0.3)
+for contacts in ([], [floor]):  # the second process, which has body b, has none
+    solution = am.distributed(lambda: am.Model([above, beside], held, contacts))
+    solution.check()
+    assert sum(solution.counts.values()) == 9 * len(contacts)
+    expected = 0.012 * 200 if contacts else 0.0
+    print("solved" if (solution.resultant[2] > expected) == bool(contacts) else "wrong")
 """
 
 FOLLOWED = """
-import amontons as am
-from amontons.linear.distributed import SpreadMatrix
+import numpy as np, amontons as am
+from amontons.linear.distributed import FAINT, SpreadMatrix
 plain, off = SpreadMatrix.solve, []
 def solve(self, b, reduction):
     x = plain(self, b, reduction)
-    pc, fine = self.ksp.getPC(), self.A
+    pc, fine = self.preconditioner, self.A.copy()
+    diagonal = fine.getDiagonal()
+    diagonal.array = np.where(self.held, FAINT * self.diagonal, diagonal.array)
+    fine.setDiagonal(diagonal)
     for k in range(pc.getMGLevels() - 1, 0, -1):
         fine = fine.PtAP(pc.getMGInterpolation(k))
         coarse = pc.getMGSmoother(k - 1).getOperators()[0].copy()
@@ -368,10 +382,11 @@ def _check_files(path, model, fields):
         assert (near & (force < 1e-7 * abs(reaction).max())).any(axis=1).all()
 
 
-def test_an_error_of_the_first_process_reaches_both(on_two):
+def test_an_error_reaches_both_and_parts_without_contacts_solve(on_two):
     done = on_two("-c", WRONG)
     assert done.returncode == 0, done.stderr
     assert done.stdout.count("no such mesh") == 2
+    assert done.stdout.count("solved") == 4
 
 
 def test_coarse_matrices_follow_the_contacts(on_two):

@@ -10,16 +10,14 @@ assembles and keeps its part, and together they run a semismooth Newton method
 
 from __future__ import annotations
 
-import traceback
-from collections.abc import Callable, Iterator
-from contextlib import contextmanager
-from typing import Any, TypeVar
+from collections.abc import Callable
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy import sparse
 
-from ...core.errors import AmontonsError, InvalidInput
+from ...core.errors import InvalidInput, MissingDependency
 from ...core.threads import asked, threads
 from ...linear.distributed import SpreadMatrix
 from ...linear.petsc import Petsc, mpi, petsc
@@ -29,10 +27,10 @@ from ..meshes.partition import partition
 from .cutting import Share, Whole, shares, whole
 from .model import Model
 from .spread_solution import DistributedSolution
+from .together import ended_together, together
 
 Array = NDArray[np.float64]
 Index = NDArray[np.int64]
-T = TypeVar("T")
 TOLERANCE = 1e-8
 
 
@@ -52,13 +50,16 @@ def distributed(
     not solve yet (bodies that contact alone holds, large strains, constraints, plastic flow),
     SingularOperator where multigrid does not converge, and what making the model raises.
     """
-    if not (isinstance(tolerance, float | int) and 0 < tolerance < 1):
-        raise InvalidInput(f"tolerance: expected a number between 0 and 1, got {tolerance!r}")
-    petsc()
+    try:
+        petsc()
+    except MissingDependency:
+        _check_options(tolerance, linear)
+        raise
     comm = mpi().COMM_WORLD if comm is None else comm
     if comm.size > 1 and not asked():
         threads(1)  # one core each
     with ended_together(comm):
+        together(comm, lambda: _check_options(tolerance, linear))
         share = _received(model, comm)
         rows = [together(comm, lambda: _rows(share))]
         problem = _problem(share, rows, comm, linear or Petsc())
@@ -68,41 +69,12 @@ def distributed(
         return solution
 
 
-class OnAll(Exception):
-    """An error that all processes know of, though it happened on one."""
-
-    def __init__(self, reason: Exception) -> None:
-        self.reason = reason
-        super().__init__(str(reason))
-
-
-@contextmanager
-def ended_together(comm: Any) -> Iterator[None]:
-    """End all processes when this one alone fails, as the others would wait for it for ever."""
-    try:
-        yield
-    except OnAll as known:
-        raise known.reason from None
-    except AmontonsError:  # of sums that all have alike
-        raise
-    except BaseException:
-        if comm.size > 1:
-            traceback.print_exc()
-            comm.Abort(1)
-        raise
-
-
-def together(comm: Any, work: Callable[[], T]) -> T:
-    """What `work` returns here; raises OnAll where it fails on any process, on all of them."""
-    error, out = None, None
-    try:
-        out = work()
-    except Exception as reason:
-        error = reason
-    errors = [e for e in comm.allgather(error) if e is not None]
-    if errors:
-        raise OnAll(errors[0])
-    return out  # type: ignore[return-value]  # work has returned it
+def _check_options(tolerance: float, linear: Petsc | None) -> None:
+    """Raise InvalidInput for what `distributed` can not take."""
+    if not (isinstance(tolerance, float | int) and 0 < tolerance < 1):
+        raise InvalidInput(f"tolerance: expected a number between 0 and 1, got {tolerance!r}")
+    if not isinstance(linear, Petsc | None):
+        raise InvalidInput(f"linear: expected Petsc(...), got {type(linear).__name__}")
 
 
 def _received(model: Model | Callable[[], Model], comm: Any) -> Share:
@@ -132,11 +104,8 @@ def _made(model: Model | Callable[[], Model], processes: int) -> tuple[Whole, In
     return given, partition(given.points, processes)
 
 
-def _rows(share: Share) -> tuple[sparse.bsr_array, Index]:
-    """Rows (own, n) of the stiffness in the frames of contacts, and the own local nodes.
-
-    Columns are PETSc's numbers.
-    """
+def _rows(share: Share) -> sparse.bsr_array:
+    """Rows (own, n) of the stiffness in the frames of contacts; columns are PETSc's."""
     d = share.fixed.shape[1]
     frame = np.full(len(share.nodes), -1)
     frame[share.framed] = np.arange(len(share.framed))
@@ -145,16 +114,17 @@ def _rows(share: Share) -> tuple[sparse.bsr_array, Index]:
         local = np.arange(first, first + len(mesh.points))
         first += len(mesh.points)
         parts.append(_rows_of_body(stiffness(mesh, material), local, share, frame))
-    pointers = [np.zeros(1, dtype=np.int64)]
-    for block in parts:
-        pointers.append(pointers[-1][-1] + block[0][1:])
-    blocks = (
-        np.concatenate([p[2] for p in parts]), np.concatenate([p[1] for p in parts]),
-        np.concatenate(pointers),
-    )  # fmt: skip
+    if len(parts) == 1:  # without a copy
+        pointers, columns, blocks = parts[0]
+    else:
+        ends = [np.zeros(1, dtype=np.int64)]
+        for block in parts:
+            ends.append(ends[-1][-1] + block[0][1:])
+        pointers = np.concatenate(ends)
+        columns, blocks = (np.concatenate([p[k] for p in parts]) for k in (1, 2))
     own = int(share.own.sum()) * d
-    K = sparse.bsr_array(blocks, shape=(own, int(share.starts[-1]) * d))
-    return K, np.flatnonzero(share.own)
+    shape = own, int(share.starts[-1]) * d
+    return sparse.bsr_array((blocks, columns, pointers), shape=shape)
 
 
 def _rows_of_body(
@@ -163,9 +133,11 @@ def _rows_of_body(
     """Pointers, PETSc's nodes and blocks of the own rows of one body of this process."""
     own = share.own[local]
     counts = np.diff(K.indptr)
-    row = np.repeat(np.arange(len(local)), counts)
-    kept = own[row]
-    row, column, blocks = row[kept], K.indices[kept], K.data[kept]
+    row = np.repeat(np.arange(len(local), dtype=np.int32), counts)
+    column, blocks = K.indices, K.data
+    if not own.all():
+        kept = own[row]
+        row, column, blocks = row[kept], column[kept], blocks[kept]
     for nodes, turn in ((row, "kab,kbc->kac"), (column, "kac,kbc->kab")):
         at = frame[local[nodes]]
         some = np.flatnonzero(at >= 0)
@@ -173,24 +145,23 @@ def _rows_of_body(
         blocks[some] = (np.einsum(turn, F, blocks[some]) if nodes is row
                         else np.einsum(turn, blocks[some], F))  # fmt: skip
     pointers = np.concatenate([[0], np.cumsum(counts[own])])
-    return pointers, share.number[local[column]], np.asarray(blocks, dtype=float)
+    return pointers, share.number[local][column], np.asarray(blocks, dtype=float)
 
 
 def _problem(
-    share: Share, rows: list[tuple[sparse.bsr_array, Index]], comm: Any, options: Petsc
+    share: Share, rows: list[sparse.bsr_array], comm: Any, options: Petsc
 ) -> SpreadProblem:
     """Matrix, load and supports of this process in the basis of contacts.
 
     rows: the one result of `_rows`, taken out of the list, so that it can go when PETSc has it.
     """
-    (K, own), d = rows.pop(), share.fixed.shape[1]
-    contacts = share.contacts
+    d, contacts = share.fixed.shape[1], share.contacts
     frames = np.zeros((0, d, d)) if not len(contacts.node) else contacts.frames
     dofs = contacts.node[:, None] * d + np.arange(d)
 
     def turned(values: Array) -> Array:
         """Values (o d, ...) at own nodes in the frames of contacts."""
-        out = values.reshape(len(own), d, -1).copy()
+        out = values.reshape(len(share.fixed), d, -1).copy()
         out[contacts.node] = np.einsum("kab,kbc->kac", frames, out[contacts.node])
         return out.reshape(values.shape)
 
@@ -198,7 +169,7 @@ def _problem(
     contact = np.zeros(len(fixed), dtype=bool)
     contact[dofs] = True
     matrix = SpreadMatrix(
-        comm, K, _basis(share, comm.rank) if share.coupled else None,
+        comm, rows.pop, _basis(share, comm.rank) if share.coupled else None,
         modes=turned(share.modes), d=d, fixed=fixed, contact=contact, options=options,
     )  # fmt: skip
     y = matrix.to_basis(turned(share.prescribed.ravel()))

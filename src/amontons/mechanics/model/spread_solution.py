@@ -19,6 +19,7 @@ from ..elements.nodal_stress import stress_of
 from ..meshes.partition import part_of
 from ..meshes.write import write_meshes
 from .cutting import Share
+from .together import ended_together, together
 
 Array = NDArray[np.float64]
 Index = NDArray[np.int64]
@@ -126,19 +127,23 @@ class DistributedSolution:
 
         Of nodes: displacement, contact_force (on slaves, global axes), contact_status (0 open
         or no contact, 1 sticks, 2 slips), reaction (force of supports), von_mises, unit of
-        stress.  Raises InvalidInput for another suffix.
+        stress.  Raises on all InvalidInput for another suffix, and what writing a part raises.
         """
         path = Path(path)
         if path.suffix != ".pvtu":
             raise InvalidInput(f"path: expected a name that ends in .pvtu, got {path.name!r}")
         piece = f"{path.stem}_{self.comm.rank}.vtu"
         meshes, fields, cells = self._part()
-        if meshes:
-            write_meshes(path.with_name(piece), meshes, fields, cells)
         names = self.comm.gather(piece if meshes else None)
-        if names is not None:
-            put(path, _pvtu([name for name in names if name]).encode())
-        self.comm.barrier()
+
+        def put_own() -> None:
+            if meshes:
+                write_meshes(path.with_name(piece), meshes, fields, cells)
+            if names is not None:
+                put(path, _pvtu([name for name in names if name]).encode())
+
+        with ended_together(self.comm):
+            together(self.comm, put_own)
 
     def _part(self) -> tuple[list[Any], dict[str, Array], dict[str, Array]]:
         """Own cells with the values at their nodes; a cell is of the first who has a node."""

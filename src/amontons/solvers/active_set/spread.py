@@ -18,7 +18,7 @@ three-dimensional contact problems with Coulomb friction", SIAM J. Sci. Comput. 
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -108,6 +108,7 @@ class SpreadActiveSet:
         block = np.where(both, block, np.eye(d) * (~able)[:, :, None])
         compliance = np.where(both, np.linalg.inv(block), 0.0)
         self.rho = 1 / np.linalg.norm(compliance, 2, axis=(1, 2))
+        self.block = block
         diagonal = np.diagonal(block, axis1=1, axis2=2)
         count = able[:, 1:].sum(axis=1)
         tangential = np.where(able[:, 1:], diagonal[:, 1:], 0.0).sum(axis=1)
@@ -228,6 +229,7 @@ class SpreadActiveSet:
         plain = (given.G_r == np.eye(d)).all(axis=2) & ~given.G_u.any(axis=2)
         wanted = ~now & ~plain
         some = wanted.any(axis=1)
+        given = self._scaled(given, wanted)
         self.K.hold(held, Sliding(own.dofs[some], wanted[some], given.G_r[some],
                                   given.G_u[some]))  # fmt: skip
         moved = self._state(y)
@@ -237,6 +239,21 @@ class SpreadActiveSet:
         b[own.dofs] = asked
         b[held] = 0.0
         return self._state(y + self.K.solve(b, part))
+
+    def _scaled(self, given: Conditions, wanted: Mask) -> Conditions:
+        """The same conditions, in rows whose blocks on the diagonal are diag K.
+
+        A contact that hardly slides has a large G_u, which no smoother of K bears.
+        """
+        both = wanted[:, :, None] & wanted[:, None, :]
+        d = wanted.shape[1]
+        block = np.einsum("kij,kjl->kil", given.G_r, self.block) + given.G_u
+        others = np.eye(d) * (~wanted)[:, :, None]
+        inverse = np.linalg.inv(np.where(both, block, others))
+        diagonal = np.diagonal(self.block, axis1=1, axis2=2)
+        scale = np.where(both, inverse * diagonal[:, :, None], others)
+        G_r, G_u = (np.einsum("kij,kjl->kil", scale, G) for G in (given.G_r, given.G_u))
+        return replace(given, G_r=G_r, G_u=G_u, b=np.einsum("kij,kj->ki", scale, given.b))
 
     def _solution(
         self, state: _State, error: float, converged: bool, steps: int, why: str
