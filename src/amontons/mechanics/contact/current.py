@@ -35,6 +35,7 @@ from ...problem.law import Law
 from ...problem.law.law import MU, TRESCA
 from ...problem.law.states import OPEN, SLIP, STICK
 from .current_pairs import Meetings, Pair
+from .fading import Mixture
 
 Array = NDArray[np.float64]
 Pieces = NDArray[np.int8]
@@ -72,6 +73,12 @@ class CurrentContact:
         """Where the pairs meet at the positions (nodes, d) of all nodes."""
         return Meetings([pair.at(positions) for pair in self.pairs])
 
+    def _mixed(self, force: Array, motion: Array, meeting: Meetings) -> Mixture | None:
+        """What nodes that hardly anything faces have in the place of gap and motion."""
+        give = self.law.give
+        give = np.zeros(len(force)) if give is None else give[:, 0]
+        return meeting.mixture(force, motion, (self.rho, give, self.law.offset), self.free)
+
     def local(
         self, force: Array, motion: Array, meeting: Meetings, drawn: Array | None = None
     ) -> tuple[Array, Array, Array]:
@@ -81,9 +88,11 @@ class CurrentContact:
         were drawn at the end of the last step, in the frames, a part of the slip.
         """
         axes = meeting.frames
-        r = np.einsum("pkc,pc->pk", axes, force * self.free)
-        u = np.einsum("pkc,pc->pk", axes, motion * self.free)
-        u[:, 0] = meeting.gap
+        force, motion = force * self.free, motion * self.free
+        mixed = self._mixed(force, motion, meeting)
+        r = np.einsum("pkc,pc->pk", axes, force)
+        u = np.einsum("pkc,pc->pk", axes, motion if mixed is None else mixed.motion)
+        u[:, 0] = meeting.gap if mixed is None else mixed.gap
         if drawn is not None:
             u[:, 1:] += drawn
         return r, u, axes
@@ -92,7 +101,11 @@ class CurrentContact:
         self, force: Array, motion: Array, meeting: Meetings, drawn: Array | None = None
     ) -> ContactPoint:
         """The law at forces lambda and motions s, both (nc, d), where the pairs meet."""
-        known = self, force * self.free, motion * self.free, meeting
+        force, motion = force * self.free, motion * self.free
+        mixed = self._mixed(force, motion, meeting)
+        if mixed is not None:
+            motion = mixed.motion
+        known = self, force, motion, meeting, mixed
         if not self.framed:
             return ContactPoint(*known)
         from .framed_point import FramedPoint  # which is a ContactPoint
@@ -102,12 +115,21 @@ class CurrentContact:
 
 @dataclass(frozen=True, eq=False)
 class ContactPoint:
-    """Where (2) is evaluated; arrays are made when they are asked for."""
+    """Where (2) is evaluated; arrays are made when they are asked for.
+
+    motion (nc, d): s, or what `mixed` has in its place.
+    """
 
     contact: CurrentContact
     force: Array
     motion: Array
     meeting: Meetings
+    mixed: Mixture | None = None
+
+    @property
+    def gap(self) -> Array:
+        """g, (nc,), or what `fading` has in its place."""
+        return self.meeting.gap if self.mixed is None else self.mixed.gap
 
     @property
     def n(self) -> Array:
@@ -166,7 +188,7 @@ class ContactPoint:
     def z_normal(self) -> Array:
         """z_N, (nc,): positive where closed; negative where nobody is met."""
         along = (self.n * self.force).sum(axis=1)
-        apart = self.meeting.gap + self.give * along + self.contact.law.offset
+        apart = self.gap + self.give * along + self.contact.law.offset
         apart = self.contact.rho * apart
         closed = along + self.cohesion - apart
         return np.where(self.meeting.met, closed, -np.abs(along) - np.abs(apart))
