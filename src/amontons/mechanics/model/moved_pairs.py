@@ -194,7 +194,8 @@ class PairLinearisation:
         partials, by_share, _ = self._chained
         by_force = blocks_of(partials[0])
         if self.point.mixed is not None:
-            shares = by_components(self.point.meeting.shares, self.parts.contact.free.astype(float))
+            free = self.parts.contact.free.astype(float)
+            shares = by_components(self.point.meeting.shares, free)
             by_force = by_force + blocks_of(by_share) @ shares
         by_force = by_force @ self.parts.gathers
         return in_rows(by_force, self.parts.at.ravel(), len(self.rest))
