@@ -26,7 +26,7 @@ def overhanging(dim, more=None):
 
 
 def shifted(model, way):
-    """(parts, displacements (nodes, d)): the upper body pressed in a little, and moved along."""
+    """(parts, displacements (nodes, d)): the upper body pressed in a little, and moved."""
     parts = large_deformation(model).parts
     u = np.zeros(parts.X.shape)
     u[: parts.ends[0], 0] = way
