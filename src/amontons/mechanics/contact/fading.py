@@ -34,7 +34,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import sparse
 
-from ...linear.sums import sum_of_blocks, sum_of_products
+from ...linear.sums import Blocks, sum_of_blocks, sum_of_products
 
 if TYPE_CHECKING:
     from .current import Partials
@@ -71,7 +71,8 @@ class Fading:
         """Sums (nc,) of parts (f, a)."""
         rows = self.at.rows
         kept = rows >= 0
-        return np.bincount(rows[kept], parts[kept], minlength=len(self.areas))
+        found = np.bincount(rows[kept], parts[kept], minlength=len(self.areas))
+        return np.asarray(found, dtype=np.float64)
 
     # ---------------------------------------------------------------- at nodes
     @cached_property
@@ -132,57 +133,56 @@ class Fading:
 
         force (nc, d): lambda, held; by_share (nc, m, d), by_weight (nc, m).
         """
-        parts, rows, (nc, m) = self.at.shared, self.at.rows, by_weight.shape
-        own, _, dofs = self.at.slopes.integrals
-        a_f = rows.shape[1]
+        rows, (nc, m), n = self.at.rows, by_weight.shape, self.at.x.size
         a, whole = (np.where(self.faint, part, 1.0) for part in self._sums)
         kappa = np.where(self.faint, self._kappa, 0.0)
-        by_kappa = by_weight * (6 * kappa / FULL * (1 - kappa / FULL) / FULL)[:, None]
-        by_kappa = np.where(self.faint[:, None], by_kappa * kappa[:, None], 0.0)
+        steep = 6 * kappa / FULL * (1 - kappa / FULL) * kappa / FULL  # kappa dw/dkappa
+        by_kappa = by_weight * steep[:, None]
         by_share = np.where(self.faint[:, None, None], by_share, 0.0)
-        pushed = np.einsum("pmd,pd->pm", by_share, self.shares @ force)
-        # by a_s, by sum_q M_sq, by D_s; lambda_q / A_q times the factor of s
-        by_a = -(pushed + by_kappa) / a[:, None]
-        by_whole = by_kappa / whole[:, None]
+        grown = np.einsum("pmd,pd->pm", by_share, self.shares @ force) + by_kappa
+        by_a = -grown / a[:, None]
         D = np.where(self.faint, self.at.weights, 1.0)
-        by_own = (pushed + by_kappa) / D[:, None]
+        by_own = grown / D[:, None]
         some = self._some
         taken = self._there(by_share * self._factor[:, None, None])[some]  # (f, s, m, d)
-        borne = self._there(force / self.areas[:, None])[some]  # (f, q, d)
-        by_M = np.einsum("fsmd,fqd->fsqm", taken, borne)
-        by_M += self._there(by_a)[some][:, :, None] * self._there(self._covered)[some][
-            :, None, :, None
-        ]
-        by_M += self._there(by_whole)[some][:, :, None]
-        kept = (rows >= 0)[some]
-        both = kept[:, :, None] & kept[:, None, :] & ~np.eye(a_f, dtype=bool)
-        by_M = np.where(both[..., None], by_M, 0.0)
-        place = np.cumsum(some) - 1
-        pairs = np.flatnonzero(some[parts.of])
-        values = np.einsum("ksqm,ksqw->ksmw", by_M[place[parts.of[pairs]]],
-                           own[pairs][:, :, :a_f])  # fmt: skip
-        at = rows[parts.of[pairs]]
-        at = np.where(at[:, :, None] >= 0, at[:, :, None] * m + np.arange(m), -1)
-        count, n = len(pairs), self.at.x.size
-        direct = (values.reshape(count, a_f * m, dofs.shape[1]), at.reshape(count, a_f * m),
-                  dofs[pairs])  # fmt: skip
-        # by D of the neighbours in a_s, and of s
-        through = self._beside[some][:, :, None, :] * self._there(1 / self.areas)[some][
-            :, None, None, :
-        ]
-        through = through * self._there(by_a)[some][:, :, :, None]  # (f, s, m, q)
+        by_M = np.einsum(
+            "fsmd,fqd->fsqm", taken, self._there(force / self.areas[:, None])[some]
+        )
+        covered = self._there(self._covered)[some]
+        by_M += self._there(by_a)[some][:, :, None] * covered[:, None, :, None]
+        by_M += self._there(by_kappa / whole[:, None])[some][:, :, None]
+        # by D of the neighbours in a_s, (f, s, m, q)
+        through = (self._beside * self._there(1 / self.areas)[:, None])[some][:, :, None]
+        through = through * self._there(by_a)[some][..., None]
+        f, slots = rows[some].shape
         into = np.where(rows[some][:, :, None] >= 0,
                         rows[some][:, :, None] * m + np.arange(m), -1)  # fmt: skip
-        f = len(into)
-        blocks = [(through.reshape(f, a_f * m, a_f), into.reshape(f, a_f * m),
+        blocks = [(through.reshape(f, slots * m, slots), into.reshape(f, slots * m),
                    np.maximum(rows[some], 0)),
                   (by_own[:, :, None], np.arange(nc)[:, None] * m + np.arange(m),
                    np.arange(nc)[:, None])]  # fmt: skip
         by_weights = sum_of_blocks(blocks, (nc * m, nc))
-        rest = sum_of_blocks([direct], (nc * m, n))
+        direct = sum_of_blocks([self._by_facets(by_M)], (nc * m, n))
         return sum_of_products(
-            [(None, rest), (by_weights, self.at.slopes.weights)], (nc * m, n)
+            [(None, direct), (by_weights, self.at.slopes.weights)], (nc * m, n)
         )
+
+    def _by_facets(self, by_M: Array) -> Blocks:
+        """Entries of derivatives by_M (f, s, q, m) by M_sq on facets with a faint node."""
+        of, some, m = self.at.shared.of, self._some, by_M.shape[3]
+        rows, slots = self.at.rows, by_M.shape[1]
+        kept = (rows >= 0)[some]
+        both = kept[:, :, None] & kept[:, None, :] & ~np.eye(slots, dtype=bool)
+        by_M = np.where(both[..., None], by_M, 0.0)
+        own, _, dofs = self.at.slopes.integrals
+        pairs = np.flatnonzero(some[of])
+        place = (np.cumsum(some) - 1)[of[pairs]]
+        values = np.einsum("ksqm,ksqw->ksmw", by_M[place], own[pairs][:, :, :slots])
+        at = rows[of[pairs]]
+        at = np.where(at[:, :, None] >= 0, at[:, :, None] * m + np.arange(m), -1)
+        count = len(pairs)
+        return (values.reshape(count, slots * m, dofs.shape[1]),
+                at.reshape(count, slots * m), dofs[pairs])  # fmt: skip
 
 
 @dataclass(frozen=True, eq=False)

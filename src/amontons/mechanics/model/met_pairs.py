@@ -66,7 +66,8 @@ def areas_around(skin: Skin, nodes: Index, X: Array) -> Array:
     """Areas of facets around nodes (nc,), equal parts to corners, at positions X (n, d)."""
     share = np.linalg.norm(skin.areas(X), axis=1) / skin.corners
     share = share[:, None] * skin.real
-    return np.bincount(skin.nodes.ravel(), share.ravel(), minlength=len(X))[nodes]
+    found = np.bincount(skin.nodes.ravel(), share.ravel(), minlength=len(X))
+    return np.asarray(found[nodes], dtype=np.float64)
 
 
 def _axes(placed: Placed, linear: Discretisation) -> sparse.csr_array | None:
