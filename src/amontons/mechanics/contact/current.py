@@ -77,7 +77,8 @@ class CurrentContact:
         """What nodes that hardly anything faces have in the place of gap and motion."""
         give = self.law.give
         give = np.zeros(len(force)) if give is None else give[:, 0]
-        return meeting.mixture(force, motion, (self.rho, give, self.law.offset), self.free)
+        offset = np.broadcast_to(self.law.offset, len(force))
+        return meeting.mixture(force, motion, (self.rho, give, offset), self.free)
 
     def local(
         self, force: Array, motion: Array, meeting: Meetings, drawn: Array | None = None
