@@ -132,7 +132,8 @@ def test_a_body_leaves_the_edge_of_the_other_and_comes_back(swap):
         x, pushed = spread(step)
         size = np.abs(pushed).sum() + 1e-12
         assert np.abs(pushed.sum(axis=0)).max() < 1e-12 * size
-        closed.append(int((step.state.force[:, 0] > 0).sum()))
+        normal = step.state.force[:, 0]  # slivers beside the edge bear next to nothing
+        closed.append(int((normal > 1e-3 * normal.max(initial=1e-9)).sum()))
         first = len(lower.mesh.points)
         forces.append(pushed[first:].sum(axis=0))
     forces = np.array(forces)

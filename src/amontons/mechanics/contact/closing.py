@@ -53,3 +53,19 @@ def slid_while_open(
     s = s - n * (n * s).sum(axis=1)[:, None]
     part = np.minimum(gap / np.where(comes, closer, 1.0), 1.0)
     return np.where(comes, part * np.linalg.norm(s, axis=1), 0.0)
+
+
+def left(z: Array, short: Array) -> Array:
+    """1 - short / |z|, at least zero, (nc,), for z (nc, m): what is left of its length."""
+    size = np.linalg.norm(z, axis=1)
+    longer = size > short
+    part = np.where(longer, 1 - short / np.where(longer, size, 1.0), 0.0)
+    return np.where(short > 0, part, 1.0)
+
+
+def slope_of_left(z: Array, short: Array) -> Array:
+    """Derivative of left(z, short) z by z, (nc, m, m)."""
+    part, size = left(z, short), np.linalg.norm(z, axis=1)
+    way = z / np.where(size > 0, size, 1.0)[:, None]
+    along = np.where(part > 0, 1 - part, 0.0)[:, None, None]
+    return part[:, None, None] * np.eye(z.shape[1]) + along * way[:, :, None] * way[:, None, :]

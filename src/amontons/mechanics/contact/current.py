@@ -39,7 +39,9 @@ from numpy.typing import NDArray
 from ...problem.law import Law
 from ...problem.law.law import MU, TRESCA
 from ...problem.law.states import OPEN, SLIP, STICK
+from .closing import left, slope_of_left
 from .current_pairs import Meetings, Pair
+from .fading import Mixture
 
 Array = NDArray[np.float64]
 Pieces = NDArray[np.int8]
@@ -77,6 +79,13 @@ class CurrentContact:
         """Where the pairs meet at the positions (nodes, d) of all nodes."""
         return Meetings([pair.at(positions) for pair in self.pairs])
 
+    def _mixed(self, force: Array, motion: Array, meeting: Meetings) -> Mixture | None:
+        """What nodes that hardly anything faces have in the place of gap and motion."""
+        give = self.law.give
+        give = np.zeros(len(force)) if give is None else give[:, 0]
+        offset = np.broadcast_to(self.law.offset, len(force))
+        return meeting.mixture(force, motion, (self.rho, give, offset), self.free)
+
     def local(
         self, force: Array, motion: Array, meeting: Meetings, drawn: Array | None = None,
         play: Array | None = None,
@@ -88,12 +97,14 @@ class CurrentContact:
         a, which is none.
         """
         axes = meeting.frames
-        r = np.einsum("pkc,pc->pk", axes, force * self.free)
-        u = np.einsum("pkc,pc->pk", axes, motion * self.free)
+        force, motion = force * self.free, motion * self.free
+        mixed = self._mixed(force, motion, meeting)
+        r = np.einsum("pkc,pc->pk", axes, force)
+        u = np.einsum("pkc,pc->pk", axes, motion if mixed is None else mixed.motion)
         if play is not None:
             z = r[:, 1:] - self.rho[:, None] * u[:, 1:]
-            u[:, 1:] += (1 - _left(z, self.rho * play))[:, None] * z / self.rho[:, None]
-        u[:, 0] = meeting.gap
+            u[:, 1:] += (1 - left(z, self.rho * play))[:, None] * z / self.rho[:, None]
+        u[:, 0] = meeting.gap if mixed is None else mixed.gap
         if drawn is not None:
             u[:, 1:] += drawn
         return r, u, axes
@@ -103,7 +114,11 @@ class CurrentContact:
         play: Array | None = None,
     ) -> ContactPoint:  # fmt: skip
         """The law at forces lambda and motions s, both (nc, d), where the pairs meet."""
-        known = self, force * self.free, motion * self.free, meeting
+        force, motion = force * self.free, motion * self.free
+        mixed = self._mixed(force, motion, meeting)
+        if mixed is not None:
+            motion = mixed.motion
+        known = self, force, motion, meeting, mixed
         if not self.framed:
             return ContactPoint(*known, play)
         from .framed_point import FramedPoint  # which is a ContactPoint
@@ -113,13 +128,22 @@ class CurrentContact:
 
 @dataclass(frozen=True, eq=False)
 class ContactPoint:
-    """Where (2) is evaluated; arrays are made when they are asked for.  play (nc,): a."""
+    """Where (2) is evaluated; arrays are made when they are asked for.
+
+    motion (nc, d): s, or what `mixed` has in its place; play (nc,): a.
+    """
 
     contact: CurrentContact
     force: Array
     motion: Array
     meeting: Meetings
+    mixed: Mixture | None = None
     play: Array | None = None
+
+    @property
+    def gap(self) -> Array:
+        """g, (nc,), or what `fading` has in its place."""
+        return self.meeting.gap if self.mixed is None else self.mixed.gap
 
     @property
     def n(self) -> Array:
@@ -178,7 +202,7 @@ class ContactPoint:
     def z_normal(self) -> Array:
         """z_N, (nc,): positive where closed; negative where nobody is met."""
         along = (self.n * self.force).sum(axis=1)
-        apart = self.meeting.gap + self.give * along + self.contact.law.offset
+        apart = self.gap + self.give * along + self.contact.law.offset
         apart = self.contact.rho * apart
         closed = along + self.cohesion - apart
         return np.where(self.meeting.met, closed, -np.abs(along) - np.abs(apart))
@@ -193,18 +217,7 @@ class ContactPoint:
         """z_T, (nc, d), in global axes."""
         if self.play is None:
             return self._z
-        return _left(self._z, self.contact.rho * self.play)[:, None] * self._z
-
-    def _shortened(self, in_z: Array) -> Array:
-        """Derivatives by z_T (nc, d, d) as those by z_T without a."""
-        if self.play is None:
-            return in_z
-        left = _left(self._z, self.contact.rho * self.play)
-        size = np.linalg.norm(self._z, axis=1)
-        way = self._z / np.where(size > 0, size, 1.0)[:, None]
-        along = np.where(left > 0, 1 - left, 0.0)[:, None, None]
-        moved = left[:, None, None] * np.eye(len(self.n[0]))
-        return in_z @ (moved + along * way[:, :, None] * way[:, None, :])
+        return left(self._z, self.contact.rho * self.play)[:, None] * self._z
 
     @cached_property
     def bound(self) -> Array:
@@ -317,7 +330,8 @@ class ContactPoint:
         eye = np.eye(d)
         tangential = eye - n[:, :, None] * n[:, None, :]
         in_z, in_bound = self._friction(pieces)
-        in_z = self._shortened(in_z)
+        if self.play is not None:
+            in_z = in_z @ slope_of_left(self._z, self.contact.rho * self.play)
         law, z = self.contact.law.plain, np.where(closed > 0, self.z_normal, 0.0)[:, None]
         slope = np.where(law.given(z), 0.0, law.parameters[:, MU])
         in_bound = in_bound * (slope * closed)[:, None]
@@ -373,14 +387,6 @@ class ContactPoint:
         sign = np.select([kind == SLIP, kind == BACK], [1.0, -1.0], 0.0)
         size = sign * self._bound((pieces > 0) & (pieces < 4))
         return -size[:, None, None] * self.n[:, :, None] * _tangents(self.n)[:, None, :]
-
-
-def _left(z: Array, short: Array) -> Array:
-    """1 - short / |z|, at least zero, (nc,), for z (nc, m): what is left of its length."""
-    size = np.linalg.norm(z, axis=1)
-    longer = size > short
-    left = np.where(longer, 1 - short / np.where(longer, size, 1.0), 0.0)
-    return np.where(short > 0, left, 1.0)
 
 
 def _slides(kind: Pieces) -> NDArray[np.bool_]:

@@ -24,8 +24,10 @@ slip along the mean of n' and the master's normal n_M, towards the point d besid
 A' on master nodes by gradients of their functions.  With (3) alone slips of nodes that close
 have errors of first order in the load step, opposite for both sides as slaves.
 
-Nodes of which hardly anything faces the master, and those without a row, carry no force of
-their own: the others of their facets take their share, and B_ps > 0 at such a node s ([PW]).
+Nodes without a row carry no force of their own: the others of their facets take their share,
+and B_ps > 0 at such a node s ([PW]).  Nodes of which hardly anything faces the master get the
+mean pressure of their neighbours, see `fading`; in dynamics and ties, where who carries stays
+for a step or for good, they are like nodes without a row.
 A node that does not meet is open, its gap the distance from the closest master node.
 
 Facets of second order have multipliers at their corners, psi dual to the functions of first
@@ -59,6 +61,7 @@ from ...linear.sums import sum_of_blocks, sum_of_products
 from .couples import Couples
 from .current_slopes import MortarSlopes
 from .facing import Skin
+from .fading import Fading
 from .folds import Fold
 from .shared import Shared
 
@@ -76,7 +79,8 @@ class MortarPair:
     names: of both surfaces, for messages.  fold: of one surface against itself, whose sides
     slave and master are then, and all nodes of which have a row.  offset (nc,): what is added
     to gaps, of a clearance that is not that of the meshes.  axes (2 nc, nodes): c of
-    `surface_axes`, of tangents that the slave carries; None for none.
+    `surface_axes`, of tangents that the slave carries; None for none.  areas (nc,): undeformed,
+    around the slaves, of `fading`; None: nodes that hardly anything faces drop out.
     """
 
     slaves: Index
@@ -87,6 +91,7 @@ class MortarPair:
     fold: Fold | None = None
     offset: Array | float = 0.0
     axes: sparse.csr_array | None = None
+    areas: Array | None = None
 
     @property
     def around(self) -> tuple[Skin, Mask]:
@@ -171,7 +176,7 @@ class MortarMeeting:
         return Shared.at(self.pair, self.x, self.row < 0)
 
     @cached_property
-    def _weights(self) -> Array:
+    def weights(self) -> Array:
         """D, (nc,), zero where nobody meets."""
         parts = self.shared
         nodes = self.pair.slave.nodes[parts.facets]
@@ -182,12 +187,12 @@ class MortarMeeting:
     @property
     def met(self) -> Mask:
         """Slaves that meet the master, (nc,)."""
-        return self._weights > 0
+        return self.weights > 0
 
     @cached_property
     def by_weight(self) -> Array:
         """1 / D, (nc,), zero where nobody meets."""
-        return np.where(self.met, 1.0, 0.0) / np.where(self.met, self._weights, 1.0)
+        return np.where(self.met, 1.0, 0.0) / np.where(self.met, self.weights, 1.0)
 
     @cached_property
     def rows(self) -> Index:
@@ -332,6 +337,14 @@ class MortarMeeting:
         if earlier.approach.nnz:
             out -= self.closed_by(earlier)[:, None] * (earlier.approach @ self.x)
         return out
+
+    @cached_property
+    def fading(self) -> Fading | None:
+        """What mixes the law of nodes that hardly anything faces; None for none."""
+        if self.pair.areas is None or not len(self.slaves):
+            return None
+        found = Fading(self, self.pair.areas)
+        return found if found.faint.any() else None
 
     @cached_property
     def couples(self) -> Couples:

@@ -24,6 +24,7 @@ from scipy import sparse
 from ...linear.sums import by_components
 from .carried import TiedMeeting, TiedPair
 from .current_mortar import MortarMeeting, MortarPair
+from .fading import Fading, Mixture
 from .geometry import Obstacle, frames
 from .surface_axes import carried_frames
 
@@ -199,6 +200,37 @@ class Meetings:
         data = found.data - (found.indices == slaves[rows])
         rest = sparse.csr_array((data, found.indices, found.indptr), shape=found.shape)
         return sparse.csr_array(rest.T)
+
+    @cached_property
+    def _fading(self) -> list[Fading | None]:
+        """Those of the parts."""
+        return [part.fading if isinstance(part, MortarMeeting) else None for part in self.parts]
+
+    def mixture(
+        self, force: Array, motion: Array, numbers: tuple[Array, Array, Array], free: Mask
+    ) -> Mixture | None:
+        """Of `fading` at forces and motions (nc, d); None where nothing fades.
+
+        numbers: rho, C and o, (nc,) each; free (nc, d).
+        """
+        parts = self._fading
+        if not any(parts):
+            return None
+        weights, passed, start = np.ones(len(force)), np.zeros(force.shape), 0
+        for part, fading in zip(self.parts, parts, strict=True):
+            mine = slice(start, start + len(part.slaves))
+            start = mine.stop
+            if fading is not None:
+                weights[mine] = fading.weights
+                passed[mine] = fading.shares @ force[mine]
+        return Mixture(weights, passed, *numbers, free, force, motion, self.gap, self.normals)
+
+    @cached_property
+    def shares(self) -> sparse.csr_array:
+        """Mean forces of neighbours per force, (nc, nc), of `fading`."""
+        blocks = [sparse.csr_array((len(part.slaves),) * 2) if fading is None else fading.shares
+                  for part, fading in zip(self.parts, self._fading, strict=True)]  # fmt: skip
+        return sparse.csr_array(sparse.block_diag(blocks, format="csr"))
 
     def distances(self) -> Array:
         """T x of ties, (nc, d); zero of others."""

@@ -147,6 +147,15 @@ class MortarSlopes:
         return own, cross, _dofs(np.concatenate([slave, master], axis=1), self.at.x.shape[1])
 
     @cached_property
+    def weights(self) -> sparse.csr_array:
+        """dD/dx, (nc, nodes d)."""
+        own, _, dofs = self.integrals
+        mass = own[:, :, : self.at.pair.slave.nodes.shape[1]]
+        rows = self.at.rows[self.at.shared.of]
+        shape = len(self.at.slaves), self.at.x.size
+        return sum_of_blocks([(mass.sum(axis=2), rows, dofs)], shape)
+
+    @cached_property
     def _distances(self) -> SlotSlopes:
         """Of G by the integrals, a part per pair of facets; B is held."""
         parts, pair, d = self.at.shared, self.at.pair, self.at.x.shape[1]
@@ -214,7 +223,6 @@ class MortarSlopes:
         rows = parts.of[:, None] * a * d + np.arange(a * d)
         held = values, rows, dofs
         # D_p in lambda / D_p
-        weights = sum_of_blocks([(mass.sum(axis=2), row[parts.of], dofs)], (nc, n))
         scale = np.where(parts.kept, self.at.by_weight[row], 0.0)
         by_weight = -(parts.psi * scale[:, :, None])[..., None] * w[:, :, None]  # (f, p, r, c)
         by_weight = np.where((row >= 0)[:, :, None, None], by_weight, 0.0)
@@ -222,7 +230,7 @@ class MortarSlopes:
         rows = np.arange(f * a * d).reshape(f, a * d)
         by_weights = sum_of_blocks([(by_weight, rows, np.maximum(row, 0))], (f * a * d, nc))
         rest = sum_of_blocks([held], (f * a * d, n))
-        return sum_of_products([(None, rest), (by_weights, weights)], (f * a * d, n))
+        return sum_of_products([(None, rest), (by_weights, self.weights)], (f * a * d, n))
 
     def _onto(
         self, z: Array, by_x: sparse.csr_array, mine: tuple[Index, slice],

@@ -66,7 +66,8 @@ class Shared:
         total = np.zeros((len(facets), *own.shape[1:]))
         np.add.at(total, numbers, own[there])
         mass = total[:, :, :a]
-        kept = _carrying(slave, facets, mass, whole, without)
+        least = HARDLY if pair.areas is None else 0.0
+        kept = _carrying(slave, facets, mass, whole, without, least)
         psi = dual_functions(mass, kept, slave.real[facets])
         return cls(of, other, facets, numbers, total, cross, psi, kept)
 
@@ -86,13 +87,18 @@ class Shared:
         return self.psi / np.where(self.kept, self.weights, 1.0)[:, :, None]
 
 
-def _carrying(slave: Skin, facets: Index, mass: Array, whole: Array, without: Mask) -> Mask:
-    """Slots (f, a) of facets (f,) that carry force; whole: areas of all slave facets."""
+def _carrying(  # noqa: PLR0913
+    slave: Skin, facets: Index, mass: Array, whole: Array, without: Mask, least: float
+) -> Mask:
+    """Slots (f, a) of facets (f,) that carry force; whole: areas of all slave facets.
+
+    least: part of a node that has to face the master.
+    """
     n = len(without)
     share = (whole / slave.corners)[:, None] * slave.real
     around = np.bincount(slave.nodes.ravel(), share.ravel(), minlength=n)
     nodes, real = slave.nodes[facets], slave.real[facets]
     reached = np.bincount(nodes.ravel(), mass.sum(axis=2).ravel(), minlength=n)
     reached = reached / np.where(around > 0, around, 1.0)
-    kept = nodes_with_multiplier(nodes, real, without, reached < HARDLY, reached)
+    kept = nodes_with_multiplier(nodes, real, without, reached < least, reached)
     return kept[nodes] & real

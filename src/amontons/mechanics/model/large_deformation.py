@@ -142,8 +142,7 @@ class LargeDeformation(NonlinearProblem):
         """
         (motion, meeting), contact = self._meeting(u), self.parts.contact
         rest = balanced(self.parts, meeting, rest)
-        force = rest[self.parts.at]
-        return contact.at(force, motion, meeting, self.drawn, self.play), rest
+        return contact.at(rest[self.parts.at], motion, meeting, self.drawn, self.play), rest
 
     def _needed(self, u: Array, pressures: Array | None = None) -> Array:
         """f_int - f (dofs,) at displacements u (nodes, d), or at given pressures, too."""
@@ -212,15 +211,17 @@ class LargeDeformation(NonlinearProblem):
             u, contact = self.displacement(v), self.parts.contact
             motion, meeting = self._meeting(u)
             rest = balanced(self.parts, meeting, self._needed(u))
-            force = rest[self.parts.at]
-            local = contact.local(force, motion, meeting, self.drawn, self.play)
+            local = contact.local(rest[self.parts.at], motion, meeting, self.drawn, self.play)
             self._last[:] = v.copy(), *local, rest
         return tuple(part.copy() for part in self._last[1:])  # type: ignore[return-value]
 
     def local_velocity(self, v: Array) -> Array:
         """u = [gap, slip since the last step], (nc, d), in the frames at the state v."""
-        s, meeting = self._meeting(self.displacement(v))
-        return self.parts.contact.local(0 * s, s, meeting, self.drawn, self.play)[1]
+        try:
+            return self._local(v)[1]
+        except InvertedCells:  # of forces, which only what fades asks for
+            s, meeting = self._meeting(self.displacement(v))
+            return self.parts.contact.local(0 * s, s, meeting, self.drawn, self.play)[1]
 
     def motion(self, r: Array, v: Array | None = None) -> tuple[Array, Array]:
         """([gap, slip], v) at the state v, without one at 0."""
@@ -321,9 +322,8 @@ class LargeDeformation(NonlinearProblem):
         displaced = now.displacement(v)
         blocks = now._needed_slopes(displaced)[1]
         force = (then.load - now.load).at(displaced) - self.parts.matrix(blocks) @ moved
-        meeting = self.parts.meet(displaced)
+        meeting, w = self.parts.meet(displaced), np.array(tangent.w)
         across = meeting.relative(moved.reshape(displaced.shape))
-        w = np.array(tangent.w)
         w[:, 0] += (meeting.normals * across).sum(axis=1)
         return replace(tangent, f=tangent.f + force[self.parts.free], w=w)
 

@@ -31,6 +31,7 @@ def met_pairs(model: Model, slaves: list[Index], linear: Discretisation) -> list
     """The pairs of the contacts; slaves: nodes of their rows."""
     d = model.dimension
     is_free = free_dofs(linear).reshape(-1, d)
+    X = np.concatenate([body.mesh.points for body in model.bodies])
     out: list[Pair] = []
     if not model.contacts:  # a floor that no node can meet
         out.append(ObstaclePair(Plane(np.eye(d)[-1]), np.zeros(0, dtype=np.int64)))
@@ -47,20 +48,26 @@ def met_pairs(model: Model, slaves: list[Index], linear: Discretisation) -> list
             meshes.append((model.bodies[k].mesh, name))
         names = (contact.slave, ", ".join(contact.masters))
         if len(meshes) == 2 and is_itself(*meshes[0], *meshes[1]):
-            x = np.concatenate([body.mesh.points for body in model.bodies])
-            pair = folded(nodes, skins[0], is_free[nodes], x, names)
-            out.append(replace(pair, axes=axes))
+            pair = folded(nodes, skins[0], is_free[nodes], X, names)
+            out.append(replace(pair, axes=axes, areas=areas_around(skins[0], nodes, X)))
             continue
         master = Skin.joined(skins[1:])
         pair = MortarPair(nodes, skins[0], master, is_free[nodes], names, axes=axes)
         if not contact.tied:
-            out.append(pair)
+            out.append(replace(pair, areas=areas_around(skins[0], nodes, X)))
             continue
-        x = np.concatenate([body.mesh.points for body in model.bodies])
         blocks = sparse.bsr_array(linear.stored_stiffness, blocksize=(d, d))
         beside = (np.ones(len(blocks.indices)), blocks.indices, blocks.indptr)
-        out.append(TiedPair.of(pair, x, sparse.csr_array(beside, shape=(len(x), len(x)))))
+        out.append(TiedPair.of(pair, X, sparse.csr_array(beside, shape=(len(X), len(X)))))
     return out
+
+
+def areas_around(skin: Skin, nodes: Index, X: Array) -> Array:
+    """Areas of facets around nodes (nc,), equal parts to corners, at positions X (n, d)."""
+    share = np.linalg.norm(skin.areas(X), axis=1) / skin.corners
+    share = share[:, None] * skin.real
+    found = np.bincount(skin.nodes.ravel(), share.ravel(), minlength=len(X))
+    return np.asarray(found[nodes], dtype=np.float64)
 
 
 def _axes(placed: Placed, linear: Discretisation) -> sparse.csr_array | None:

@@ -29,7 +29,7 @@ from numpy.typing import NDArray
 from scipy import sparse
 
 from ...linear.condensed import Structure
-from ...linear.sums import among, in_rows, sum_of_products
+from ...linear.sums import among, by_components, in_rows, sum_of_products
 from ..contact.carried import TiedMeeting
 from ..contact.current import ContactPoint, Partials
 from ..contact.current_mortar import MortarMeeting
@@ -162,11 +162,19 @@ class PairLinearisation:
         out[self.parts.at] = self.point.residual()
         return out[self.parts.free]
 
+    @cached_property
+    def _chained(self) -> tuple[Partials, Array, Array]:
+        """Partials of the law by gap and motion themselves, and those of `fading`."""
+        mixed = self.point.mixed
+        if mixed is not None:
+            return mixed.chained(self.partials)
+        return self.partials, np.zeros(0), np.zeros(0)
+
     @property
     def structure(self) -> Structure:
         """What the matrix consists of."""
         returned = self._others[self.parts.free]
-        return structure_of(self.parts, self.u, self.partials[0], returned)
+        return structure_of(self.parts, self.u, self._chained[0][0], returned)
 
     @cached_property
     def _kept(self) -> Array:
@@ -183,7 +191,13 @@ class PairLinearisation:
     @cached_property
     def _law(self) -> sparse.csr_array:
         """Derivative of the rows of contacts by the forces on their side, (dofs, dofs)."""
-        by_force = blocks_of(self.partials[0]) @ self.parts.gathers
+        partials, by_share, _ = self._chained
+        by_force = blocks_of(partials[0])
+        if self.point.mixed is not None:
+            free = self.parts.contact.free.astype(float)
+            shares = by_components(self.point.meeting.shares, free)
+            by_force = by_force + blocks_of(by_share) @ shares
+        by_force = by_force @ self.parts.gathers
         return in_rows(by_force, self.parts.at.ravel(), len(self.rest))
 
     def _left(self, needed: Any) -> Any:
@@ -203,7 +217,7 @@ class PairLinearisation:
         """dF/dx without the rows of `blocks` that are `_kept`, (dofs, dofs)."""
         parts, meeting = self.parts, self.point.meeting
         shape = len(self.rest), len(self.rest)
-        _, by_normal, by_gap, by_motion, by_axis = self.partials
+        (_, by_normal, by_gap, by_motion, by_axis), by_share, by_weight = self._chained
         force = _own(parts, meeting, self.needed)
         stiffness = sparse.csr_array(parts.matrix(self.blocks))
         rows, taken = [], [(-self._others, sparse.csr_array(self._left(stiffness)))]
@@ -217,7 +231,11 @@ class PairLinearisation:
                 taken.append((None, -turned))
                 if parts.chained:
                     taken.append((self._others, sparse.csr_array(self._left(turned))))
-                rows.append(_law_of_pair(part, old, *slopes))
+                row = _law_of_pair(part, old, *slopes)
+                if part.fading is not None:
+                    known = force[mine], by_share[mine], by_weight[mine]
+                    row = sparse.csr_array(row + part.fading.slopes(*known))
+                rows.append(row)
             elif isinstance(part, TiedMeeting):
                 rows.append(_law_of_tie(part, old, *slopes))
             else:
@@ -249,7 +267,7 @@ class PairLinearisation:
         change = self._kept * (self.parts.matrix(self.blocks) @ prescribed)
         change += self._near @ prescribed
         if drift is not None:
-            change[self.parts.at] += np.einsum("pij,pj->pi", self.partials[3], drift)
+            change[self.parts.at] += np.einsum("pij,pj->pi", self._chained[0][3], drift)
         return change[self.parts.free] - self.passed(NodalForces.of(load).at(self.u))
 
 

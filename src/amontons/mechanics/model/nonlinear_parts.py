@@ -126,6 +126,12 @@ class NonlinearParts:
         """States, and these parts with the sides of folds there."""
         return deque(maxlen=KEPT)
 
+    def without_fading(self) -> NonlinearParts:
+        """The same with nodes that drop out where hardly anything faces them."""
+        pairs = tuple(replace(pair, areas=None) if isinstance(pair, MortarPair) else pair
+                      for pair in self.contact.pairs)  # fmt: skip
+        return replace(self, contact=replace(self.contact, pairs=pairs))
+
     @cached_property
     def gathers(self) -> sparse.csr_array:
         """C of `contact.current_mortar`: what contacts need of f_int - f, (nc d, dofs).

@@ -27,17 +27,25 @@ def places_of_failure(parts: NonlinearParts, u: Array, earlier: Meetings) -> str
 
 
 def _parted(now: Meetings, earlier: Meetings) -> Iterator[str]:
-    """Slaves that face nothing of their masters, or have left their edges."""
+    """Slaves that face nothing of their masters, or are leaving their edges."""
     for here, before in zip(now.parts, earlier.parts, strict=True):
-        if not isinstance(here, MortarMeeting) or here.pair.fold is not None:
+        if not (isinstance(here, MortarMeeting) and isinstance(before, MortarMeeting)):
+            continue
+        if here.pair.fold is not None:
             continue
         names = "{!r} faces {!r}".format(*here.pair.names)
-        left = np.flatnonzero(before.met & ~here.met)
+        left = np.flatnonzero(_bearing(before) & ~_bearing(here))
         if not here.met.any():
             yield f"{names} nowhere: no contact force holds anything there"
         elif len(left):
             place = ", ".join(f"{c:.4g}" for c in here.x[here.slaves[left[0]]])
-            yield f"{names} no more at {len(left)} nodes, as at ({place})"
+            yield f"{names} hardly or no more at {len(left)} nodes, as at ({place})"
+
+
+def _bearing(meeting: MortarMeeting) -> NDArray[np.bool_]:
+    """Slaves (nc,) that face enough of the master to bear for themselves."""
+    faint = False if meeting.fading is None else meeting.fading.faint
+    return meeting.met & ~np.asarray(faint)
 
 
 def _flat(parts: NonlinearParts, u: Array) -> Iterator[str]:

@@ -88,7 +88,8 @@ class LargeMovingModel:
         check_turning(method, model)
         self.method, self.motion, self.tolerance = method, Motion(model), tolerance
         body = self.motion.body
-        self.parts, self._all = nonlinear_parts(body), self.motion.parts
+        self.parts = nonlinear_parts(body).without_fading()
+        self._all = self.motion.parts
         inertia = Inertia(body, method.mass_damping, 0.0, method.lumped)
         self.M, self.C = inertia.M, inertia.C  # without viscosity, which bodies have
         viscous = method.stiffness_damping / method.step

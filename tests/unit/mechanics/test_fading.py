@@ -1,0 +1,107 @@
+"""Nodes that leave the master's edge: forces are continuous, tangents exact, paths go on."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from tangent_checker import checked_tangents
+
+import amontons as am
+from amontons.mechanics.contact.fading import FULL
+from amontons.mechanics.model.large_deformation import large_deformation, large_step
+
+NEO = am.NeoHookean(1.0, 0.3)
+FAR = {2: -0.2, 3: -0.35}  # ways after which a facet of the slave has a part of 0.2 left
+
+
+def overhanging(dim, more=None):
+    """A block with a part of its lower side in front of another body."""
+    cells = {2: ((3, 1), (5, 1)), 3: ((2, 2, 1), (3, 3, 1))}[dim]
+    upper = am.Body(am.box((1,) * dim, cells[0]), NEO, name="upper")
+    below = am.box((1,) * dim, cells[1], origin=(*[0.05] * (dim - 1), -1))
+    return am.Model([upper, am.Body(below, NEO, name="lower")],
+                    [am.Fix("upper.top", 0), am.Fix("lower.bottom", 0)],
+                    [am.Contact("upper.bottom", master="lower.top",
+                                **({"mu": 0.3} if more is None else more))])  # fmt: skip
+
+
+def shifted(model, way):
+    """(parts, displacements (nodes, d)): the upper body pressed in a little, and moved."""
+    parts = large_deformation(model).parts
+    u = np.zeros(parts.X.shape)
+    u[: parts.ends[0], 0] = way
+    u[: parts.ends[0], -1] = -0.01
+    return parts, u
+
+
+@pytest.mark.parametrize("dim", [2, 3])
+def test_what_fades_is_continuous(dim):
+    """w and the shares of neighbours grow from nothing, and end where nobody fades."""
+    model, seen, faint, last = overhanging(dim), [], 0, None
+    force = np.random.default_rng(2).uniform(0.5, 1, len(large_deformation(model).parts.at))
+    for way in np.linspace(0.0, 0.5, 101):
+        parts, u = shifted(model, -way)
+        meeting = parts.meet(u).parts[0]
+        w, passed = np.ones(len(force)), np.zeros(len(force))
+        if meeting.fading is not None:
+            w = meeting.fading.weights
+            faint += 1
+            passed = meeting.fading.shares @ (force * meeting.weights)
+        law = (1 - w) * passed + w * force * meeting.weights
+        if last is not None:
+            seen.append(np.abs(law - last).max())
+        last = law
+    assert max(seen) < 0.05 * force.max() * parts.contact.pairs[0].areas.max()
+    assert faint > 10
+
+
+def test_a_uniform_pressure_is_no_error():
+    """Neighbours with one pressure p hand on D p, whatever faces the master."""
+    parts, u = shifted(overhanging(3), FAR[3])
+    meeting = parts.meet(u).parts[0]
+    fading = meeting.fading
+    assert fading is not None
+    assert fading.weights[fading.faint].max() < 1
+    mean = fading.shares @ meeting.weights
+    np.testing.assert_allclose(mean[fading.faint], meeting.weights[fading.faint], rtol=1e-12)
+    assert FULL < 0.5  # nodes of a side that ends with the master's bear for themselves
+
+
+@pytest.mark.parametrize(("dim", "more"), [
+    (2, None), (3, None), (2, {"mu": 0.3, "stiffness": 5.0, "stick_stiffness": 3.0}),
+    (3, {"mu": 0.3, "mu_across": 0.1, "direction": (1, 0, 0)}),
+])  # fmt: skip
+def test_the_tangent_of_what_fades_is_exact(dim, more):
+    """Between differences, where some nodes fade."""
+    model, rng = overhanging(dim, more), np.random.default_rng(5)
+    parts, u = shifted(model, FAR[dim])
+    fixed = np.ones(parts.X.size, dtype=bool)
+    fixed[parts.free] = False
+    start = u.ravel()
+    problem = large_step(model, np.zeros(len(start)), np.where(fixed, start, 0.0),
+                         start + 0.004 * rng.standard_normal(len(start)))  # fmt: skip
+    draws = [(start[parts.free] + 0.004 * one, 0.01 * other)
+             for one, other in rng.standard_normal((4, 2, problem.unknowns))]  # fmt: skip
+    assert all(problem.contact_point(v).mixed is not None for v, _ in draws)
+    assert checked_tangents(problem, draws) >= 2
+
+
+def round_end(cells, name, *, up):
+    """A block with a round end at the origin, above or below."""
+    mesh = am.box((1.0,) * 3, cells)
+    x = mesh.points - (0.5, 0.5, 0.0)
+    x[:, 2] += (1.0 - np.sqrt(1.0 - (x[:, :2] ** 2).sum(axis=1))) * (1 - x[:, 2])
+    turn = (1, 1, 1) if up else (-1, 1, -1)
+    return am.Body(replace(mesh, points=x * turn), NEO, name=name)
+
+
+def test_round_ends_slide_off_each_other_in_space():
+    """Over three quarters of the body; there was no equilibrium where a node dropped out."""
+    both = [round_end((3,) * 3, "one", up=True), round_end((4,) * 3, "other", up=False)]
+    way = (lambda x, t: 0.3 * max(t - 1, 0), 0.0, lambda x, t: -0.2 * min(t, 1))
+    model = am.Model(both, [am.Fix("one.top", way), am.Fix("other.top", 0)],
+                     [am.Contact("one.bottom", master="other.bottom", mu=0.3)])  # fmt: skip
+    steps = list(am.evolve(model, am.QuasiStatic(0.5), until=3.5))
+    assert max(step.solution.convergence.linear_iterations for step in steps) <= 20
+    up = [np.ravel(step.resultant())[2] for step in steps[2:]]
+    assert (np.diff(up) < 0).all()
