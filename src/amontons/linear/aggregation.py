@@ -41,6 +41,7 @@ STEPS = 12  # of Lanczos's method for rho, or of the power iteration: within som
 MISSED = 1.1  # by which rho is taken larger after power iterations, which come from below
 OMEGA = 4 / 3
 LARGEST = 600  # block rows that are inverted whole at most
+JUMP = 50.0  # of the largest couplings from node to node at which parts move on their own
 WEAK = 0.05  # couplings below this part of the largest ones of both units join nothing
 
 
@@ -111,12 +112,19 @@ class Aggregates:
         return Aggregates(modes, self.width, part)
 
 
-def largest_jump(A: NodeBlocks) -> float:
-    """The largest ratio of the strongest couplings (`_couplings`) of nodes that touch."""
-    row, column, _, strongest = _couplings(A, 1)
-    known = strongest[column] > 0
-    ratio = strongest[row[known]] / strongest[column[known]]
-    return float(np.sqrt(ratio.max(initial=0.0)))
+def separates(A: NodeBlocks) -> bool:
+    """True where the stiffness jumps from node to node, or soft cells part strong couplings."""
+    from scipy.sparse import csgraph
+
+    row, column, squares, largest = _couplings(A, 1)
+    known = largest[column] > 0
+    jumps = largest[row[known]] / largest[column[known]]
+    if jumps.max(initial=0.0) > JUMP**2:
+        return True
+    whole = sparse.csr_matrix((squares > 0, A.indices, A.indptr), shape=(A.nodes,) * 2)
+    strong = sparse.csr_matrix(_strong(A, 1))
+    count = csgraph.connected_components
+    return bool(count(strong, directed=False)[0] > count(whole, directed=False)[0])
 
 
 def _strong(A: NodeBlocks, width: int) -> sparse.csr_array:

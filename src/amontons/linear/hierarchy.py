@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from scipy import sparse
 
 from ..core.errors import SingularOperator
-from .aggregation import LARGEST, Aggregates, largest_jump
+from .aggregation import LARGEST, Aggregates, separates
 from .chunks import better_numbers
 from .grid import GridBlocks
 from .level_matrix import LevelMatrix
@@ -27,7 +27,6 @@ Index = NDArray[np.int64]
 Kind = Callable[[LevelMatrix], LevelMatrix]
 COARSEST = 120  # nodes of the level that is solved directly, at most
 COARSEST_UNITS = 60  # aggregates of such a level
-JUMP = 50.0  # of the stiffness from node to node above which given levels are left out
 SMALL = 1e-10  # singular values of the coarsest matrix below this part of the largest rest
 
 
@@ -184,7 +183,7 @@ class Hierarchy:
         nodes: those of A, where they are not in the order of the unknowns.
         """
         nodes = nodes or Nodes.of(component)
-        if prolongations and modes is not None and largest_jump(A) > JUMP:
+        if prolongations and modes is not None and separates(A):
             prolongations = ()
         return cls.on(A, nodes, transfers(prolongations, component, nodes), modes)
 
