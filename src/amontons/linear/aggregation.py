@@ -135,7 +135,7 @@ def _strong(A: NodeBlocks, width: int) -> sparse.csr_array:
     return sparse.csr_array(sparse.coo_array(kept, shape=(len(largest),) * 2))
 
 
-def _couplings(A: NodeBlocks, width: int) -> tuple[Index, Index, Array, Array]:
+def _couplings(A: NodeBlocks, width: int) -> tuple[Index, NDArray[np.integer], Array, Array]:
     """(row, column, |A_ij|^2) of units of `width` block rows, and the largest of each row.
 
     The largest one is of other units, and couplings of a unit with itself count as infinite.
