@@ -174,17 +174,16 @@ def over_stages(
     work: float,
     *arguments: Any,
     backward: bool = False,
-    tell: bool = False,
 ) -> None:
     """kernel(first, last, *arguments) on all even chunks, then on all odd ones.
 
-    backward: the other way round; tell: the kernel is told by a last argument which they are.
+    backward: the other way round.
     """
     for odd in (True, False) if backward else (False, True):
         some = chunks[odd::2]
         if some:
             share = 0.5 * work if len(chunks) > 1 else work
-            over_chunks(kernel, some, share, *arguments, *((odd,) if tell else ()))
+            over_chunks(kernel, some, share, *arguments)
 
 
 def shared(kernel: Kernel, ranges: Sequence[Range], arguments: tuple[Any, ...]) -> None:

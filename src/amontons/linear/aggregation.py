@@ -8,6 +8,10 @@ on it, orthonormalised there; the prolongation is smoothed by one damped block J
 with T those motions cut up.  Aggregates and T are made by pyamg; rho is estimated from a fixed
 start, so that the same matrix always has the same levels, to the last bit.
 
+Nodes i and j do not touch where |A_ij|^2 < WEAK^2 m_i m_j, m_i the largest |A_il| with l not i:
+an aggregate must not bridge the soft layer between two stiff ones, which move on their own.
+Couplings are not compared with diagonal blocks, which hold the ones of padding.
+
 An aggregate is a unit of k / 3 block rows that stay together.  Where nodes have parts (pieces
 of bodies that hang together without contact), an aggregate keeps to one of them, so that
 coarse levels hold the rigid motions of each on its own: what slides or opens does not have to
@@ -37,6 +41,8 @@ STEPS = 12  # of Lanczos's method for rho, or of the power iteration: within som
 MISSED = 1.1  # by which rho is taken larger after power iterations, which come from below
 OMEGA = 4 / 3
 LARGEST = 600  # block rows that are inverted whole at most
+JUMP = 50.0  # of the largest couplings from node to node at which parts move on their own
+WEAK = 0.05  # couplings below this part of the largest ones of both units join nothing
 
 
 @dataclass(frozen=True, eq=False)
@@ -58,7 +64,7 @@ class Aggregates:
         """
         from pyamg.aggregation import fit_candidates, standard_aggregation
 
-        graph = units_of(A.indptr, A.indices, self.width)
+        graph = _strong(A, self.width)
         if self.part is not None:
             graph = _within(graph, self.part)
         joined, _ = standard_aggregation(graph)
@@ -104,6 +110,49 @@ class Aggregates:
         modes = self.modes.reshape(len(number), 3, -1)[order].reshape(self.modes.shape)
         part = None if self.part is None else self.part[order[:: self.width] // self.width]
         return Aggregates(modes, self.width, part)
+
+
+def separates(A: NodeBlocks) -> bool:
+    """True where the stiffness jumps from node to node, or soft cells part strong couplings."""
+    from scipy.sparse import csgraph
+
+    row, column, squares, largest = _couplings(A, 1)
+    known = largest[column] > 0
+    jumps = largest[row[known]] / largest[column[known]]
+    if jumps.max(initial=0.0) > JUMP**2:
+        return True
+    whole = sparse.csr_matrix((squares > 0, A.indices, A.indptr), shape=(A.nodes,) * 2)
+    strong = sparse.csr_matrix(_strong(A, 1))
+    count = csgraph.connected_components
+    return bool(count(strong, directed=False)[0] > count(whole, directed=False)[0])
+
+
+def _strong(A: NodeBlocks, width: int) -> sparse.csr_array:
+    """The graph of units of `width` block rows with the couplings that are not WEAK."""
+    row, column, squares, largest = _couplings(A, width)
+    strong = squares >= WEAK**2 * np.sqrt(largest[row] * largest[column])
+    kept = (np.ones(np.count_nonzero(strong)), (row[strong], column[strong]))
+    return sparse.csr_array(sparse.coo_array(kept, shape=(len(largest),) * 2))
+
+
+def _couplings(A: NodeBlocks, width: int) -> tuple[Index, NDArray[np.integer], Array, Array]:
+    """(row, column, |A_ij|^2) of units of `width` block rows, and the largest of each row.
+
+    The largest one is of other units, and couplings of a unit with itself count as infinite.
+    """
+    graph = units_of(A.indptr, A.indices, width)
+    squares = np.einsum("kij,kij->k", A.data, A.data)
+    if width > 1:
+        unit = np.arange(A.nodes) // width
+        whole = sparse.csr_array((squares, A.indices, A.indptr), shape=(A.nodes,) * 2)
+        join = sparse.csr_array((np.ones(A.nodes), (np.arange(A.nodes), unit)))
+        whole = sparse.csr_array(join.T @ whole @ join)
+        whole.sort_indices()
+        squares = whole.data
+    row = np.repeat(np.arange(graph.shape[0]), np.diff(graph.indptr))
+    own = row == graph.indices
+    largest = np.maximum.reduceat(np.where(own, 0.0, squares), graph.indptr[:-1])
+    return row, graph.indices, np.where(own, np.inf, squares), largest
 
 
 def _within(graph: sparse.csr_array, part: Index) -> sparse.csr_array:

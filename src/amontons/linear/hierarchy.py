@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from scipy import sparse
 
 from ..core.errors import SingularOperator
-from .aggregation import LARGEST, Aggregates
+from .aggregation import LARGEST, Aggregates, separates
 from .chunks import better_numbers
 from .grid import GridBlocks
 from .level_matrix import LevelMatrix
@@ -178,9 +178,13 @@ class Hierarchy:
     ) -> Hierarchy:
         """Galerkin levels below A; modes (n, k): near-nullspace for the algebraic ones.
 
+        All are algebraic where the stiffness jumps between nodes: prolongations that know
+        nothing of materials then bridge soft layers, and stiff ones become no coarse level's.
         nodes: those of A, where they are not in the order of the unknowns.
         """
         nodes = nodes or Nodes.of(component)
+        if prolongations and modes is not None and separates(A):
+            prolongations = ()
         return cls.on(A, nodes, transfers(prolongations, component, nodes), modes)
 
     @classmethod

