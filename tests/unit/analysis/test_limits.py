@@ -128,6 +128,17 @@ def test_columns_overturn_or_slide(count, width, height, mu):
     assert found.lower < wanted and found.width < 0.01
 
 
+def test_a_body_that_supports_hold_does_not_collapse():
+    """Its stiffness balances all: without this its nodes were taken for blocks of their own."""
+    held = am.Model(
+        [am.Body(am.box((1, 0.5), (2, 1)), am.LinearElastic(100, 0.3))],
+        [am.Fix("top", 0)], [am.Contact("bottom", am.Plane((0, 1)), mu=0.4)],
+        [am.BodyForce((0, -1))],
+    )  # fmt: skip
+    with pytest.raises(am.InvalidInput, match="supports hold every body"):
+        am.collapse_load(held, [am.BodyForce((1, 0))])
+
+
 @pytest.mark.parametrize("weight", [1e-12, 1e9])
 def test_units_of_the_live_load_change_nothing(weight):
     """A live load of one beside a dead load of a billion is less than programs keep to."""
