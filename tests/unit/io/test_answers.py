@@ -53,7 +53,7 @@ def test_broken_results_are_refused_with_their_place(tmp_path):
 
 def test_a_folder_without_a_solution_is_told_from_a_file(tmp_path):
     with pytest.raises(FileFormatError, match="a folder with solution.h5 in it"):
-        am.audit("example:block", tmp_path)
+        am.audit(am.read_case("example:hild").model, tmp_path)
 
 
 def test_what_we_write_we_read(tmp_path):
