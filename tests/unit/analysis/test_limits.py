@@ -75,6 +75,20 @@ def test_discs_in_space_are_cut_as_far_as_needed():
     assert found.upper == pytest.approx(np.tan(angle), rel=1e-4)
 
 
+def test_a_wedge_of_an_unsymmetric_matrix_jams_by_its_rows():
+    """W = F^T H: reactions hold each other where H r = 0, at tan 0.4, whatever F is."""
+
+    def wedge(a):
+        c, s = np.cos(a), np.sin(a)
+        return np.array([[c, -s, -c, s], [s, c, s, c]])
+
+    W = wedge(0.8).T @ wedge(0.4)
+    problem = am.FrictionProblem.from_delassus(W, np.zeros((2, 2)), [0.3] * 2)
+    found = am.jamming_friction(problem)
+    assert found.lower <= np.tan(0.4) * (1 + 1e-9) <= found.upper * (1 + 2e-6)
+    assert found.upper == pytest.approx(np.tan(0.4), rel=1e-4)
+
+
 def test_what_never_jams_and_what_is_refused():
     free = am.FrictionProblem.from_delassus(np.eye(2), [[0.0, 0.0]], [0.5])
     found = am.jamming_friction(free)
