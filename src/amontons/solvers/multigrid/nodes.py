@@ -315,6 +315,12 @@ def _slip_vector(H, u):
 
 
 @njit(cache=True, error_model="numpy")
+def _bound(kind, parameters, r):
+    """The bound of friction of a contact, not positive where it has none."""
+    return parameters[BOUND] if given(kind, parameters, r[0]) else parameters[MU] * r[0]
+
+
+@njit(cache=True, error_model="numpy")
 def _tangent(H, kind, parameters, r, u, state, size, V, W, L):  # noqa: PLR0913
     V[:], W[:], L[:] = 0.0, 0.0, 0.0
     n = np.empty(3)
@@ -335,7 +341,7 @@ def _tangent(H, kind, parameters, r, u, state, size, V, W, L):  # noqa: PLR0913
             continue
         t, t1, t2, slip = _slip_vector(H[c], u[c])
         fixed, mu = given(kind[c], parameters[c], r[c, 0]), parameters[c, MU]
-        bound = parameters[c, BOUND] if fixed else mu * r[c, 0]
+        bound = _bound(kind[c], parameters[c], r[c])
         if slip == 0.0 or not bound > 0.0:
             continue
         if not fixed:
@@ -349,12 +355,6 @@ def _tangent(H, kind, parameters, r, u, state, size, V, W, L):  # noqa: PLR0913
             across = -t2 * H[c, a, 1] + t1 * H[c, a, 2]
             for b in range(3):
                 L[c, a, b] = curvature * across * (-t2 * H[c, b, 1] + t1 * H[c, b, 2])
-
-
-@njit(cache=True, error_model="numpy")
-def _bound(kind, parameters, r):
-    """The bound of friction of a contact, at most 0 where it has none."""
-    return parameters[BOUND] if given(kind, parameters, r[0]) else parameters[MU] * r[0]
 
 
 @njit(cache=True, error_model="numpy")
