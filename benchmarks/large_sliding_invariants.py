@@ -3,7 +3,8 @@
     python benchmarks/large_sliding_invariants.py [--states 1000] [--meshes 5]
 
 Tangents are compared with central differences at random states, every other of which has slave
-nodes 1e-4 beside nodes or middles of edges of the master.  A state is left out, and counted,
+nodes 1e-4 beside nodes or middles of edges of the master; and slid beyond the master's
+edges, where nodes fade.  A state is left out, and counted,
 where a piece of the law, or which facets face each other, changes within the difference.
 """
 
@@ -74,21 +75,32 @@ def alike(one, other):
         for name in ("slave", "master", "kept"))  # fmt: skip
 
 
-def tangents(states):
-    """The worst relative error of the tangent over random states of all cases."""
+def tangents(states, *, off=False):
+    """The worst relative error of the tangent over random states of all cases.
+
+    off: the slave, larger now, slid beyond the master's edges, with nodes whose law fades.
+    """
     for dim, kinds, orders in CASES:
         rng, begin = np.random.default_rng(1), time.process_time()
         both = bodies(dim, kinds, orders, rng, wider=0.2)
+        sides = ("upper.bottom", "lower.top")[:: -1 if off else 1]
         model = am.Model(both, [am.Fix("lower.bottom", 0), am.Fix("upper.top", 0)],
-                         [am.Contact("upper.bottom", master="lower.top", mu=0.3)])  # fmt: skip
+                         [am.Contact(sides[0], master=sides[1], mu=0.3)])  # fmt: skip
         parts = large_deformation(model).parts
-        problem = large_step(model, np.zeros(parts.X.size), np.zeros(parts.X.size),
-                             0.01 * rng.standard_normal(parts.X.size))  # fmt: skip
-        worst, counted, left = 0.0, 0, 0
-        count = states // len(CASES) + 1
-        for k in range(count):
-            v = 0.015 * rng.standard_normal(problem.unknowns)
-            v = beside_edges(parts, v, rng) if k % 2 else v
+        worst, counted, left, faded = 0.0, 0, 0, 0
+        held = np.ones(parts.X.size, dtype=bool)
+        held[parts.free] = False
+        before = 0.01 * rng.standard_normal(parts.X.size)
+        for k in range(states // len(CASES) + 1):
+            moved = np.zeros(parts.X.shape)
+            if off:
+                moved[parts.ends[0] :, :-1] = rng.uniform(-0.6, 0.6, dim - 1)
+                moved[parts.ends[0] :, -1] = -0.01
+            moved = moved.ravel()
+            problem = large_step(model, np.zeros(parts.X.size), np.where(held, moved, 0.0),
+                                 before + moved)  # fmt: skip
+            v = moved[parts.free] + 0.015 * rng.standard_normal(problem.unknowns)
+            v = beside_edges(parts, v, rng) if k % 2 and not off else v
             way = rng.standard_normal(problem.unknowns)
             ends = [v - STEP * way, v + STEP * way]
             points = [problem.contact_point(each) for each in (v, *ends)]
@@ -97,12 +109,14 @@ def tangents(states):
             if not same:
                 left += 1
                 continue
-            before, after = (problem.residual(each) for each in ends)
+            earlier, later = (problem.residual(each) for each in ends)
             found = problem.tangent(v) @ way
-            error = np.abs(found - (after - before) / (2 * STEP)).max() / np.abs(found).max()
+            error = np.abs(found - (later - earlier) / (2 * STEP)).max() / np.abs(found).max()
             worst, counted = max(worst, error), counted + 1
-        print(f"| tangent | {dim}D {'/'.join(kinds)} {orders} | {counted} ({left} left out) | "
-              f"{worst:.1e} | {time.process_time() - begin:.0f} |", flush=True)
+            faded += points[0].mixed is not None
+        more = f", slid off, {faded} fade" if off else ""
+        print(f"| tangent | {dim}D {'/'.join(kinds)} {orders} | {counted} ({left} left out)"
+              f"{more} | {worst:.1e} | {time.process_time() - begin:.0f} |", flush=True)
 
 
 def patches(meshes):
@@ -205,6 +219,7 @@ def main():
     given = asked.parse_args()
     print("| what | model | over | worst, relative | CPU s |\n|---|---|---|---|---|")
     tangents(given.states)
+    tangents(given.states, off=True)
     patches(given.meshes)
     moments()
     momenta()

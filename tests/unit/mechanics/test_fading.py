@@ -84,6 +84,10 @@ def test_the_tangent_of_what_fades_is_exact(dim, more):
              for one, other in rng.standard_normal((4, 2, problem.unknowns))]  # fmt: skip
     assert all(problem.contact_point(v).mixed is not None for v, _ in draws)
     assert checked_tangents(problem, draws) >= 2
+    if more is None:  # and where some have slid while they were open
+        motion = problem.contact_point(draws[0][0]).motion
+        play = np.linalg.norm(motion, axis=1) * rng.uniform(0, 1, problem.contacts)
+        assert checked_tangents(replace(problem, play=play), draws) >= 2
 
 
 def round_end(cells, name, *, up):

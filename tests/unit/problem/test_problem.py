@@ -51,13 +51,13 @@ GLOBAL_FAULTS = [
     ("f", lambda a: a["f"][:-1], r"f: expected shape \(9,\), got \(8,\)"),
     ("f", lambda a: a["f"][:, None], r"f: expected shape \(9,\), got \(9, 1\)"),
     ("f", lambda a: changed(a["f"], 5, np.inf), r"f\[5\]: .*finite.*inf"),
-    ("w", lambda a: a["w"][:-1], r"w: expected shape \(2, 2\) or \(2, 3\), got \(1, 3\)"),
+    ("w", lambda a: a["w"][:-1], r"w: expected shape \(2, 2\) or \(2, 3\).* got \(1, 3\)"),
     ("w", lambda a: np.zeros((2, 4)), r"w: .*got \(2, 4\)"),
     ("w", lambda a: changed(a["w"], (1, 0), NAN), r"w\[1, 0\]: .*finite.*nan"),
     ("mu", lambda a: [0.4, -0.1], r"mu\[1\]: .*>= 0.*-0.1"),
     ("mu", lambda a: [NAN, 0.1], r"mu\[0\]: .*nan"),
     ("mu", lambda a: [[0.4, 0.4]], r"mu: expected shape \(nc,\), got \(1, 2\)"),
-    ("mu", lambda a: [0.4] * 3, r"w: expected shape \(3, 2\) or \(3, 3\), got \(2, 3\)"),
+    ("mu", lambda a: [0.4] * 3, r"w: expected shape \(3, 2\) or \(3, 3\).* got \(2, 3\)"),
 ]
 
 
@@ -79,7 +79,7 @@ DELASSUS_FAULTS = [
     ({"W": sparse.eye_array(5)}, r"W: expected shape \(6, 6\), got \(5, 5\)"),
     ({"W": changed(np.eye(6), (2, 3), NAN)}, r"W\[2, 3\]: .*finite.*nan"),
     ({"W": sparse.csr_array(changed(np.eye(6), (2, 3), NAN))}, r"W\[2, 3\]: .*finite.*nan"),
-    ({"q": np.zeros((3, 3))}, r"q: expected shape \(2, 2\) or \(2, 3\), got \(3, 3\)"),
+    ({"q": np.zeros((3, 3))}, r"q: expected shape \(2, 2\) or \(2, 3\).* got \(3, 3\)"),
     ({"q": np.zeros(7)}, r"q: .*got \(7,\)"),
     ({"q": changed(np.zeros((2, 3)), (0, 2), -np.inf)}, r"q\[0, 2\]: .*finite.*-inf"),
     ({"mu": [0.4, -2.0]}, r"mu\[1\]: .*-2.0"),

@@ -27,7 +27,7 @@ have errors of first order in the load step, opposite for both sides as slaves.
 Nodes without a row carry no force of their own: the others of their facets take their share,
 and B_ps > 0 at such a node s ([PW]).  Nodes of which hardly anything faces the master get the
 mean pressure of their neighbours, see `fading`; in dynamics and ties, where who carries stays
-for a step or for good, they are like nodes without a row.
+for a step or for good, and under a given bound they are like nodes without a row.
 A node that does not meet is open, its gap the distance from the closest master node.
 
 Facets of second order have multipliers at their corners, psi dual to the functions of first

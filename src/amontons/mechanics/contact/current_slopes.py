@@ -188,13 +188,18 @@ class MortarSlopes:
         """Derivative of sum_p B_pj lambda_p at all nodes j by x, (nodes d, nodes d).
 
         force (nc, d): lambda, held.  With z_r = sum_p psi_pr lambda_p / D_p on every facet that
-        is z own at nodes of the slave and -z cross at those of the master.
+        is z own at nodes of the slave and -z cross at those of the master; by (1) its change is
+
+            d(z h) = v Q h + z dh,    v_t = lambda_t d(W_t / D_t) - sum_r z_r dmass_rt.    (2)
+
+        That z changes by v Q, which is large on slivers, is left out, as Q h is not.
         """
         parts, slave, master = self.at.shared, self.at.pair.slave, self.at.pair.master
         scaled = force * self.at.by_weight[:, None]
-        w = np.where(parts.kept[:, :, None], scaled[self.at.rows], 0.0)  # (f, p, c)
+        carries = (parts.kept & (self.at.rows >= 0))[:, :, None]
+        w = np.where(carries, scaled[self.at.rows], 0.0)  # (f, p, c)
         z = parts.psi.swapaxes(1, 2) @ w  # (f, r, c)
-        by_x = self._slopes_of(z, w)
+        by_x = self._changes(z, w)
         a, b = slave.nodes.shape[1], master.nodes.shape[1]
         left = np.where(~parts.kept & slave.real[parts.facets], slave.nodes[parts.facets], -1)
         out = self._onto(z, by_x, (left, slice(a)), (master.nodes[parts.master], slice(b)))
@@ -206,29 +211,24 @@ class MortarSlopes:
             out = sum_of_products([(None, out), (lifts, bent)], (n, n))
         return out
 
-    def _slopes_of(self, z: Array, w: Array) -> sparse.csr_array:
-        """dz/dx, (f a d, nodes d), of z (f, a, d) of `spread`; w (f, p, d): lambda / D."""
+    def _changes(self, z: Array, w: Array) -> sparse.csr_array:
+        """v by x of (2), (f a d, nodes d), for z (f, a, d); w (f, p, d): lambda / D."""
         parts, row = self.at.shared, self.at.rows
         f, a, d = z.shape
         n, nc = self.at.x.size, len(self.at.pair.slaves)
         own, _, dofs = self.integrals
         mass = own[:, :, :a]
-        inverse = np.where(parts.kept[:, :, None], parts.inverse, 0.0)
-        # (f, r, c, s, t): by mass_st
-        by_mass = np.zeros((f, a, d, a, a))
-        by_mass += (inverse.swapaxes(1, 2)[:, :, None] * w.swapaxes(1, 2)[:, None])[..., None]
-        across = inverse.swapaxes(1, 2)[:, :, None, None, :]
-        by_mass -= z.swapaxes(1, 2)[:, None, :, :, None] * across
-        values = _through(by_mass[parts.of], mass)
+        # (k, t, c, w)
+        values = w[parts.of][..., None] * mass.sum(axis=2)[:, :, None]
+        values -= np.einsum("krc,krtw->ktcw", z[parts.of], mass)
         rows = parts.of[:, None] * a * d + np.arange(a * d)
-        held = values, rows, dofs
-        # D_p in lambda / D_p
-        scale = np.where(parts.kept, self.at.by_weight[row], 0.0)
-        by_weight = -(parts.psi * scale[:, :, None])[..., None] * w[:, :, None]  # (f, p, r, c)
-        by_weight = np.where((row >= 0)[:, :, None, None], by_weight, 0.0)
-        by_weight = by_weight.reshape(f, a, a * d).swapaxes(1, 2)
-        rows = np.arange(f * a * d).reshape(f, a * d)
-        by_weights = sum_of_blocks([(by_weight, rows, np.maximum(row, 0))], (f * a * d, nc))
+        held = values.reshape(len(dofs), a * d, dofs.shape[1]), rows, dofs
+        # D_t in lambda W / D_t
+        scale = np.where(row >= 0, self.at.by_weight[row], 0.0) * parts.weights
+        by_weight = -(w * scale[:, :, None]).reshape(-1, d, 1)
+        rows = np.arange(f * a * d).reshape(-1, d)
+        into = np.maximum(row, 0).reshape(-1, 1)
+        by_weights = sum_of_blocks([(by_weight, rows, into)], (f * a * d, nc))
         rest = sum_of_blocks([held], (f * a * d, n))
         return sum_of_products([(None, rest), (by_weights, self.weights)], (f * a * d, n))
 
@@ -238,7 +238,7 @@ class MortarSlopes:
     ) -> sparse.csr_array:  # fmt: skip
         """Of z own at nodes of the slave's facets (f, s), and -z cross at the master's (k, b).
 
-        by_x: dz/dx; with the nodes come their slots in own and cross.
+        by_x: v of (2) by x; with the nodes come their slots in own and cross.
         """
         parts = self.at.shared
         f, a, d = z.shape
@@ -248,7 +248,8 @@ class MortarSlopes:
             (mine, parts.own, own, np.arange(f)), (theirs, -parts.cross, -cross, parts.of)
         ):  # fmt: skip
             s = nodes.shape[1]
-            held = held[:, :, slots].swapaxes(1, 2)  # (., s, r)
+            held = parts.inverse[of] @ held[:, :, slots]
+            held = held.swapaxes(1, 2)  # Q h, (., s, r)
             at = np.where(nodes[:, :, None] >= 0, nodes[:, :, None] * d + np.arange(d), -1)
             columns = of[:, None, None] * a * d + np.arange(a * d).reshape(a, d)
             for c in range(d):

@@ -34,7 +34,11 @@ def dual_functions(mass: Array, kept: Mask, real: Mask) -> Array:
     size = np.sqrt(np.where(kept, np.einsum("faa->fa", mass), 1.0))
     scaled = moment / (size[:, :, None] * size[:, None, :])
     scaled += np.eye(mass.shape[1]) * ~kept[:, :, None]
-    inverse = np.linalg.inv(scaled) / (size[:, :, None] * size[:, None, :])
+    inverse = np.linalg.inv(scaled)
+    # on slivers phi are nearly dependent, and what is left of rounding in a small row of the
+    # inverse, taken times the large rows of mass, would be a force: one step of refinement
+    inverse += (np.eye(mass.shape[1]) - inverse @ scaled) @ inverse
+    inverse /= size[:, :, None] * size[:, None, :]
     weight = np.where(kept, mass.sum(axis=1), 0.0)
     return weight[:, :, None] * np.where(both, inverse, 0.0) @ shared
 

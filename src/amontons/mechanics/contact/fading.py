@@ -21,7 +21,9 @@ That is the law of g' and s' in the place of g and s, H = (lambda - D p) / rho,
 
     g' = w g + (1 - w) (n . H - C n . lambda - o),    s' = w s + (1 - w) H,                 (3)
 
-which `local` of `current` tells, so that statuses and errors are those of the law.
+which `local` of `current` tells, so that statuses and errors are those of the law.  What slid
+while open, `closing`, is taken off z_T as (2) has it: for w = 0 off the mean force.  A bound
+that is a given number would stay whole however little faces a node: Tresca's law does not fade.
 """
 
 from __future__ import annotations

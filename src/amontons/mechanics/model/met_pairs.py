@@ -47,14 +47,17 @@ def met_pairs(model: Model, slaves: list[Index], linear: Discretisation) -> list
             skins.append(Skin.of(facets, int(linear.offsets[k]) // d))
             meshes.append((model.bodies[k].mesh, name))
         names = (contact.slave, ", ".join(contact.masters))
+        # a given bound does not fade with the pressure: nodes drop out with it
+        fades = not contact.tied and contact.tresca is None
+        areas = areas_around(skins[0], nodes, X) if fades else None
         if len(meshes) == 2 and is_itself(*meshes[0], *meshes[1]):
             pair = folded(nodes, skins[0], is_free[nodes], X, names)
-            out.append(replace(pair, axes=axes, areas=areas_around(skins[0], nodes, X)))
+            out.append(replace(pair, axes=axes, areas=areas))
             continue
         master = Skin.joined(skins[1:])
         pair = MortarPair(nodes, skins[0], master, is_free[nodes], names, axes=axes)
         if not contact.tied:
-            out.append(replace(pair, areas=areas_around(skins[0], nodes, X)))
+            out.append(replace(pair, areas=areas))
             continue
         blocks = sparse.bsr_array(linear.stored_stiffness, blocksize=(d, d))
         beside = (np.ones(len(blocks.indices)), blocks.indices, blocks.indptr)
