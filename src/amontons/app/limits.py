@@ -56,7 +56,7 @@ def collapse_load(
     loads of a model, such as [BodyForce((1, 0))], or f (n,) of a problem in global form.
     Deformations are left out: bodies move as wholes.  gap: relative distance of the bounds that
     is good enough; time_limit: seconds, by default 60.  Raises UnsupportedLaw unless the law is
-    Coulomb's.
+    Coulomb's, InvalidInput for a model whose supports leave no body such a motion.
     """
     from ..analysis.limits.collapse import collapse_load as bounds
 
@@ -66,6 +66,11 @@ def collapse_load(
     if isinstance(given, FrictionProblem):
         return bounds(given, live, gap=gap, time_limit=time_limit)
     discrete, parts = _assembled(given, "collapse_load"), given.discretisation
+    if not discrete.loose_modes.shape[1]:  # its M is a stiffness, no mass that resists all
+        raise InvalidInput(
+            "collapse_load: supports hold every body, so none can move as a whole under any "
+            "load; expected blocks that contact holds"
+        )
     from ..mechanics.model.parts import Load
     from ..mechanics.model.supports import external_load
 

@@ -232,3 +232,14 @@ def test_a_ball_of_strains_where_contact_holds_the_bodies():
         energies.append(v @ (K @ v))
     at = energies[2]
     assert max(energies) <= bound.energy * at * (1 + 1e-6)
+
+
+def test_an_unsymmetric_matrix_gets_no_bounds_that_need_symmetry():
+    """The ball of the symmetric part is a point there, at rest, and the only motion slips."""
+    W = np.kron(np.ones((2, 2)), [[1.0, 0.1], [-0.1, 0.01]])
+    problem = am.FrictionProblem.from_delassus(W, [[-1.0, 0.0]] * 2, [0.3] * 2)
+    solution = am.solve(problem, tolerance=1e-10)
+    np.testing.assert_allclose(solution.u, [[0.0, -0.097 / 1.03]] * 2, atol=1e-9)
+    found = indeterminacy(problem, solution, Deadline.after(5.0))
+    assert found.bound is None and found.reactions is None and found.confined is None
+    assert found.motion == "undecided" and "W is not symmetric, by 2.0e-01" in str(found)

@@ -75,6 +75,20 @@ def test_discs_in_space_are_cut_as_far_as_needed():
     assert found.upper == pytest.approx(np.tan(angle), rel=1e-4)
 
 
+def test_a_wedge_of_an_unsymmetric_matrix_jams_by_its_rows():
+    """W = F^T H: reactions hold each other where H r = 0, at tan 0.4, whatever F is."""
+
+    def wedge(a):
+        c, s = np.cos(a), np.sin(a)
+        return np.array([[c, -s, -c, s], [s, c, s, c]])
+
+    W = wedge(0.8).T @ wedge(0.4)
+    problem = am.FrictionProblem.from_delassus(W, np.zeros((2, 2)), [0.3] * 2)
+    found = am.jamming_friction(problem)
+    assert found.lower <= np.tan(0.4) * (1 + 1e-9) <= found.upper * (1 + 2e-6)
+    assert found.upper == pytest.approx(np.tan(0.4), rel=1e-4)
+
+
 def test_what_never_jams_and_what_is_refused():
     free = am.FrictionProblem.from_delassus(np.eye(2), [[0.0, 0.0]], [0.5])
     found = am.jamming_friction(free)
@@ -126,6 +140,17 @@ def test_columns_overturn_or_slide(count, width, height, mu):
     wanted = min(width / (count * height), mu)
     assert found.upper == pytest.approx(wanted, rel=1e-7)
     assert found.lower < wanted and found.width < 0.01
+
+
+def test_a_body_that_supports_hold_does_not_collapse():
+    """Its stiffness balances all: without this its nodes were taken for blocks of their own."""
+    held = am.Model(
+        [am.Body(am.box((1, 0.5), (2, 1)), am.LinearElastic(100, 0.3))],
+        [am.Fix("top", 0)], [am.Contact("bottom", am.Plane((0, 1)), mu=0.4)],
+        [am.BodyForce((0, -1))],
+    )  # fmt: skip
+    with pytest.raises(am.InvalidInput, match="supports hold every body"):
+        am.collapse_load(held, [am.BodyForce((1, 0))])
 
 
 @pytest.mark.parametrize("weight", [1e-12, 1e9])

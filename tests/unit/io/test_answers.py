@@ -51,6 +51,11 @@ def test_broken_results_are_refused_with_their_place(tmp_path):
             am.audit(deck, path)
 
 
+def test_a_folder_without_a_solution_is_told_from_a_file(tmp_path):
+    with pytest.raises(FileFormatError, match="a folder with solution.h5 in it"):
+        am.audit(am.read_case("example:hild").model, tmp_path)
+
+
 def test_what_we_write_we_read(tmp_path):
     block = am.Body(am.box((1, 1, 1), cells=2), am.LinearElastic(100.0, 0.3))
     contact = am.Contact("bottom", am.Plane(normal=(0, 0, 1)), mu=0.3)

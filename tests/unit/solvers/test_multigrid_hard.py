@@ -9,8 +9,13 @@ from amontons.linear.patched import PatchedBlocks, Rows
 from amontons.linear.some_rows import SomeRows
 from amontons.mechanics.meshes import Cells
 from amontons.problem import matrices
+from amontons.problem.law.states import SLIP
 from amontons.problem.solution import Outcome
+from amontons.solvers.contract import Iterate
 from amontons.solvers.driver import drive
+from amontons.solvers.multigrid.cycles import _Run
+from amontons.solvers.multigrid.levels import ContactLevels
+from amontons.solvers.multigrid.nodes import CLOSED
 
 
 def die(size):
@@ -114,3 +119,52 @@ def test_products_are_kept_of_what_nobody_can_write():
     v.flags.writeable = False
     assert problem.times_M(v) is problem.times_M(v)
     np.testing.assert_array_equal(problem.times_M(v), problem.M @ v)
+
+
+def cycles_at(problem, count):
+    """The state of contact multigrid after some cycles: run, values at nodes."""
+    levels = ContactLevels.of(problem)
+    options = am.ContactMultigrid(nested=False)
+    run = _Run(levels, levels.truncation.tangent(), options, levels.finest(problem), 0)
+    x = levels.start(problem, Iterate(np.zeros((problem.contacts, problem.dimension))))
+    for _ in zip(range(count), run.cycles(x), strict=False):
+        pass
+    return run, x
+
+
+def test_slip_ends_where_it_would_turn_round(monkeypatch):
+    """The tangent holds friction in its direction: past zero a correction is thrown back."""
+    run, x = cycles_at(judged_by_residual(die(1).assemble(), monkeypatch), 6)
+    contacts = run.contacts
+    slips = (contacts.state == CLOSED + SLIP) & (contacts.r[:, 0] > 0)
+    assert slips.sum() >= 2
+    V = contacts.tangent()[0]
+    before, H = x[contacts.node], contacts.H
+    slip = np.einsum("cai,ci->ca", H[:, :, 1:], contacts.u[:, 1:])
+    for share, left in ((0.5, 0.5), (2.0, 0.0)):  # of the slip taken back, and what is left
+        moved = x.copy()
+        moved[contacts.node] -= share * slip
+        contacts.limit(V, before, moved)
+        u = np.einsum("cai,ca->ci", H, moved[contacts.node]) + contacts.w
+        wanted = contacts.u[slips] * [1, left, left]
+        np.testing.assert_allclose(u[slips], wanted, atol=1e-12 * np.abs(contacts.u).max())
+    smooth = replace(contacts, law=am.Coulomb(np.zeros(len(slips))))  # nothing jumps
+    smooth.r, smooth.u, smooth.state = contacts.r, contacts.u, contacts.state
+    moved = x.copy()
+    moved[contacts.node] -= 2 * slip
+    smooth.limit(V, before, moved)
+    u = np.einsum("cai,ca->ci", H, moved[contacts.node]) + contacts.w
+    np.testing.assert_allclose(u[slips, 1:], -contacts.u[slips, 1:], rtol=1e-9)
+
+
+def test_a_tangent_renewed_in_parts_is_the_tangent(monkeypatch):
+    """Only what has changed is multiplied, and the sum of it is what the states ask for."""
+    run, _ = cycles_at(judged_by_residual(die(1).assemble(), monkeypatch), 6)
+    assert run.updates >= 3 and run.change is not None
+    truncation = run.levels.truncation
+    at_once = truncation.tangent()
+    truncation.install(at_once, 0, run.change)
+    assert len(at_once.levels) > 1
+    for one, parts in zip(at_once.levels[1:], run.tangent.levels[1:], strict=True):
+        size = np.abs(one.A.data).max()
+        np.testing.assert_allclose(parts.A.data, one.A.data, atol=1e-12 * size, rtol=0)

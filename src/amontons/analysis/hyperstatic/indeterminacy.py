@@ -2,7 +2,9 @@
 
 The two are told apart: a motion may be the only one while reactions hold each other in many
 ways.  `held_tangents` and the ball of `motion` prove the motion where they can; `ranges` says
-what is open of the reactions of the motion that was found.
+what is open of the reactions of the motion that was found.  Both need a symmetric W or M: the
+ball takes v . M v_p for v_p . M v, and W dr = 0 for no energy of dr.  Without that, solutions
+from other starts are all that is compared, and the words say so.
 """
 
 from __future__ import annotations
@@ -12,6 +14,7 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
+from scipy import sparse
 
 from ...core.clock import Deadline
 from ...core.errors import InvalidInput, SingularOperator, TimeUp
@@ -30,6 +33,7 @@ from .ranges import SPREAD, ReactionRanges, reaction_ranges
 RANGES, BALL, PROOF, REST, MOTIONS = 0.4, 0.15, 0.3, 0.3, 0.6  # parts of the time left
 LOOSE = 0.2  # of the time, for other motions, where contact alone holds bodies
 ACCURATE, POLISH = 1e-12, 0.15  # error of a solution that is asked for, part of the time
+SYMMETRIC = 1e-8  # asymmetry of W or M, of its largest entry: less no judge of solutions sees
 NAMED = 3  # contacts whose ranges are told in words
 _PROVED = {
     "unique_every_load": "The motion is unique, whatever the load.",
@@ -208,6 +212,13 @@ def indeterminacy(
 ) -> Indeterminacy:  # fmt: skip
     """What is known in time of a Coulomb problem with a solution; proved, why: its motion."""
     solution = _polished(problem, solution, deadline)
+    far = _asymmetry(problem)
+    if far > SYMMETRIC:
+        name = "M" if problem.W is None else "W"
+        reason = (f"{name} is not symmetric, by {far:.1e} of its largest entry, and bounds of "
+                  "motions and ranges of reactions need that.")  # fmt: skip
+        known = Indeterminacy(proved, why, reason=reason)
+        return known if proved else _searched(problem, solution, known, None, deadline)
     ranges, reason = None, ""
     try:
         say("reactions of this motion")
@@ -233,6 +244,18 @@ def indeterminacy(
     if known.motion_is_unique:
         return known
     return _searched(problem, solution, known, ball, deadline)
+
+
+def _asymmetry(problem: FrictionProblem) -> float:
+    """The largest entry of A - A^T relative to that of A, which is W, or M where there is none.
+
+    0 for operators, which are stiffnesses of meshes.
+    """
+    A: Any = problem.M if problem.W is None else problem.W
+    if not (sparse.issparse(A) or isinstance(A, np.ndarray)):
+        return 0.0
+    size = float(abs(A).max())
+    return float(abs(A - A.T).max()) / size if size > 0 else 0.0
 
 
 def _polished(

@@ -10,7 +10,7 @@ cone for every pattern of open contacts, so that a bisection on mu and linear pr
 smallest mu.  Both sides are proved:
 
 - r itself, in K at `upper`, with the rest of u_N that rounding leaves;
-- z = (x, y) with M x = H_N y, y_i <= 0 at open contacts, for which v = H^T x lies strictly
+- z = (x, y) with M^T x = H_N y, y_i <= 0 at open contacts, for which v = H^T x lies strictly
   inside of the dual cone, v_N > mu |v_T|, at every contact that may be closed: then 0 < v . r =
   y . u_N <= 0 is a contradiction, at every mu up to `lower`, the least v_N / |v_T|.
 
@@ -161,7 +161,7 @@ class _Search:
             root = np.repeat(np.sqrt(1 / np.where(problem.rho > 0, problem.rho, 1.0)), self.d)
             scale = sparse.diags_array(1 / root)
             W = scale @ sparse.csc_array(W) @ scale
-            self.V, self.E = sparse.csr_array(sparse.csc_array(W)[:, normal]), None
+            self.V, self.E = sparse.csr_array(sparse.csr_array(W)[normal].T), None
             self.root, self.first = root.reshape(-1, self.d), 0
         else:
             M, H = problem.assembled().M, sparse.csc_array(problem.H)
@@ -169,7 +169,7 @@ class _Search:
             size = float(np.abs(M.diagonal()).max()) or 1.0  # type: ignore[union-attr]
             none = sparse.csc_array((H.shape[1], self.nc))
             self.V = sparse.csr_array(sparse.hstack([H.T, none]))
-            self.E = sparse.csr_array(sparse.hstack([M / size, -H[:, normal]]))
+            self.E = sparse.csr_array(sparse.hstack([M.T / size, -H[:, normal]]))
             self.root, self.first = np.ones((self.nc, self.d)), n
 
     def bounds(

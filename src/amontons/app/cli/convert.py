@@ -14,7 +14,7 @@ from ...problem.friction import Form
 from .sources import open_source
 from .terminal import check_writable
 
-SUFFIXES = (".hdf5", ".h5")
+SUFFIXES = (".hdf5", ".h5", ".inp", ".frd", ".dat")  # the last three are dealt with before
 
 
 def run(

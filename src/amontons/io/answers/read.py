@@ -43,6 +43,11 @@ def read_answer(path: Path, case: Case, time: float | None = None) -> tuple[Mode
     folder = path / "solution.h5"
     if path.is_dir() and folder.is_file():
         path = folder
+    if path.is_dir():
+        raise FileFormatError(
+            f"{path}: expected a folder with solution.h5 in it, as `amontons solve` writes; of "
+            "a case in time name one of its files, such as step-00010.vtu"
+        )
     suffix = path.suffix.lower()
     if suffix not in KNOWN:
         raise FileFormatError(

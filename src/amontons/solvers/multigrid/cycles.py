@@ -11,7 +11,7 @@ One cycle, from v on the finest level:
 3. coarse correction: one linear V(1,1) cycle, with two on the second coarse level, on levels
    that see these states, a Galerkin tangent whose test and trial spaces are truncated to the
    directions in which the contacts can move (`truncation`).  It is renewed when a state changes
-   or the error has fallen far.
+   or the error has fallen far.  Slip ends where it would turn round (`ContactNodes.limit`).
 4. smooth in reverse order.
 
 Residuals say little of what moves slowly in soft parts between stiff ones: after LATE cycles
@@ -187,7 +187,8 @@ class _Run:
         self.level = levels.hierarchy.levels[k]
         self.held = np.zeros(self.level.A.nodes, dtype=bool)
         self.held[self.contacts.node] = True
-        self.change: Array | None = None
+        self.change: Array | None = None  # of the tangent on this level
+        self.below: dict[int, Array] = {}  # and on the coarser ones
         self.states = np.full_like(self.contacts.state, -2)  # of the tangent
         self.frozen = False  # are the bounds of friction, in the tangent?
         self.updates = 0
@@ -284,11 +285,17 @@ class _Run:
         return max(balance / self.load, law / self.length)
 
     def renew(self, frozen: bool) -> None:
-        """The tangent at the present states on all coarser levels, for frozen bounds or not."""
+        """The tangent at the present states on all coarser levels, for frozen bounds or not.
+
+        Only what has changed since the last one is multiplied: not contacts that still stick.
+        """
         self.frozen = frozen
-        contacts = self.contacts.frozen() if frozen else self.contacts
-        self.change = self.levels.truncation.change(self.k, contacts, *contacts.tangent())
-        self.levels.truncation.install(self.tangent, self.k, self.change)
+        contacts, truncation = self.contacts, self.levels.truncation
+        contacts = contacts.frozen() if frozen else contacts
+        before = self.change
+        self.change = truncation.change(self.k, contacts, *contacts.tangent())
+        more = self.change if before is None else self.change - before
+        truncation.install(self.tangent, self.k, more, self.below)
         self.states = self.contacts.state.copy()
         self.updates += 1
 

@@ -175,9 +175,13 @@ class ContactNodes:
         return V, W, L
 
     def limit(self, V: Array, before: Array, x: Array) -> None:
-        """Keep of the motion since `before`, (nc, 3), what the trial space V allows."""
-        moved = x[self.node] - before
-        x[self.node] = before + np.einsum("kab,kb->ka", V, moved)
+        """Keep of the motion since `before`, (nc, 3), what the tangent holds for.
+
+        That is what its trial space V allows, and of a slip up to where it would turn round:
+        there friction jumps by twice its bound, of which the tangent knows nothing.
+        """
+        _limit(self.node, self.H, self.to_reaction, self.w, self.law.kind,
+               self.law.parameters, self.r, self.u, self.state, V, before, x)  # fmt: skip
 
     def frozen(self) -> ContactNodes:
         """The same states under Tresca's law with the present bounds; ties as they are."""
@@ -311,6 +315,12 @@ def _slip_vector(H, u):
 
 
 @njit(cache=True, error_model="numpy")
+def _bound(kind, parameters, r):
+    """The bound of friction of a contact, not positive where it has none."""
+    return parameters[BOUND] if given(kind, parameters, r[0]) else parameters[MU] * r[0]
+
+
+@njit(cache=True, error_model="numpy")
 def _tangent(H, kind, parameters, r, u, state, size, V, W, L):  # noqa: PLR0913
     V[:], W[:], L[:] = 0.0, 0.0, 0.0
     n = np.empty(3)
@@ -331,7 +341,7 @@ def _tangent(H, kind, parameters, r, u, state, size, V, W, L):  # noqa: PLR0913
             continue
         t, t1, t2, slip = _slip_vector(H[c], u[c])
         fixed, mu = given(kind[c], parameters[c], r[c, 0]), parameters[c, MU]
-        bound = parameters[c, BOUND] if fixed else mu * r[c, 0]
+        bound = _bound(kind[c], parameters[c], r[c])
         if slip == 0.0 or not bound > 0.0:
             continue
         if not fixed:
@@ -345,6 +355,30 @@ def _tangent(H, kind, parameters, r, u, state, size, V, W, L):  # noqa: PLR0913
             across = -t2 * H[c, a, 1] + t1 * H[c, a, 2]
             for b in range(3):
                 L[c, a, b] = curvature * across * (-t2 * H[c, b, 1] + t1 * H[c, b, 2])
+
+
+@njit(cache=True, error_model="numpy")
+def _limit(  # noqa: PLR0913
+    node, H, to_reaction, w, kind, parameters, r, u, state, V, before, x
+):
+    moved = np.empty(3)
+    for c in range(len(node)):
+        p = node[c]
+        for a in range(3):
+            moved[a] = x[p, a] - before[c, a]
+        for a in range(3):
+            x[p, a] = before[c, a] + (
+                V[c, a, 0] * moved[0] + V[c, a, 1] * moved[1] + V[c, a, 2] * moved[2]
+            )
+        if state[c] % CLOSED != SLIP or not _bound(kind[c], parameters[c], r[c]) > 0.0:
+            continue
+        u1, u2 = w[c, 1], w[c, 2]
+        for a in range(3):
+            u1 += H[c, a, 1] * x[p, a]
+            u2 += H[c, a, 2] * x[p, a]
+        if u1 * u[c, 1] + u2 * u[c, 2] < 0.0:
+            for a in range(3):
+                x[p, a] -= to_reaction[c, 1, a] * u1 + to_reaction[c, 2, a] * u2
 
 
 @njit(cache=True, error_model="numpy")

@@ -143,16 +143,24 @@ class Truncation:
         """Levels of one solve, without contacts so far."""
         return self.hierarchy.patched([near.rows for near in self.near[1:]])  # type: ignore[misc]
 
-    def install(self, tangent: Hierarchy, k: int, change: Array) -> None:
-        """Coarse levels below k for a change on level k, which itself stays as it is."""
+    def install(
+        self, tangent: Hierarchy, k: int, change: Array, whole: dict[int, Array] | None = None
+    ) -> None:
+        """Coarse levels below k for one more change on level k, which itself stays as it is.
+
+        whole: of the levels, by their number, the sum of all changes before, none without it;
+        this one is added.
+        """
+        whole = {} if whole is None else whole
         levels = tangent.levels
         for j in range(k, len(levels) - 1):
-            coarse = np.zeros_like(self.near[j + 1].base)
+            near, coarse = self.near[j + 1], np.zeros_like(self.near[j + 1].base)
             P, product = levels[j].P, self.products[j]
             assert P is not None
             product.apply(P, self.near[j], change, coarse)
-            self.near[j + 1].mask(coarse)
-            self.near[j + 1].put(levels[j + 1].A, coarse)  # type: ignore[arg-type]
+            near.mask(coarse)
+            whole[j + 1] = whole[j + 1] + coarse if j + 1 in whole else coarse
+            near.put(levels[j + 1].A, whole[j + 1])  # type: ignore[arg-type]
             change = coarse
         if k < len(levels) - 1:
             tangent.invert_coarsest()
@@ -242,7 +250,7 @@ class Product:
         return cls(half, row, places)
 
     def apply(self, P: Transfer, near: Near, change: Array, coarse: Array) -> None:
-        """coarse += P^T change P."""
+        """coarse += P^T change P; entries that do not change cost nothing."""
         half = np.zeros((len(self.row), 3, 3))
         if len(P.blocks):
             _half_blocks(P.indptr, P.blocks, near.column, self.half, change, half)
@@ -316,12 +324,25 @@ def _change(row, column, base, V, W, L, out):  # noqa: PLR0913
                     D[a, b] += L[i, a, b]
 
 
+@njit(cache=True)
+def _rests(block):
+    """Whether a block is zero."""
+    for a in range(3):
+        for b in range(3):
+            if block[a, b] != 0.0:
+                return False
+    return True
+
+
 @njit(cache=True, error_model="numpy")
 def _spread(p_ptr, weights, node, place, blocks, out):  # noqa: PLR0913
     """Add the blocks, each times the weights of its node, at their places in out."""
     at = 0
     for e in range(len(node)):
         i = node[e]
+        if _rests(blocks[e]):
+            at += p_ptr[i + 1] - p_ptr[i]
+            continue
         for b in range(p_ptr[i], p_ptr[i + 1]):
             w, t = weights[b], uint64(place[at])
             at += 1
@@ -335,6 +356,9 @@ def _half_blocks(p_ptr, blocks, column, place, change, half):  # noqa: PLR0913
     at = 0
     for e in range(len(column)):
         j = column[e]
+        if _rests(change[e]):
+            at += p_ptr[j + 1] - p_ptr[j]
+            continue
         for b in range(p_ptr[j], p_ptr[j + 1]):
             R, t = blocks[b], uint64(place[at])
             at += 1
@@ -351,6 +375,9 @@ def _rest_blocks(p_ptr, blocks, row, place, half, coarse):  # noqa: PLR0913
     at = 0
     for h in range(len(row)):
         i = row[h]
+        if _rests(half[h]):
+            at += p_ptr[i + 1] - p_ptr[i]
+            continue
         for a in range(p_ptr[i], p_ptr[i + 1]):
             Q, t = blocks[a], uint64(place[at])
             at += 1
