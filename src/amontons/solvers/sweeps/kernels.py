@@ -154,8 +154,7 @@ def by_approach(q):
 @njit(cache=True, error_model="numpy", fastmath={"contract"}, nogil=True)
 def visit_inplace(s, first, last, backward, r):
     """Visit contacts, the first to the last - 1 in the order; returns their change squared."""
-    nc, full, flat = len(s.order), s.rows.shape[2] > 3, r.reshape(r.size)
-    change = 0.0
+    nc, full, flat, change = len(s.order), s.rows.shape[2] > 3, r.reshape(r.size), 0.0
     for step in range(first, last):
         i = uint64(s.order[nc - 1 - step if backward else step])
         b0, b1, b2 = s.q[i, 0], s.q[i, 1], s.q[i, 2]
