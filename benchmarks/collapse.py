@@ -17,7 +17,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from machine import describe
+from machine import describe, printed
 
 import amontons as am
 
@@ -76,10 +76,7 @@ def row(name: str) -> str:
 
 def main() -> None:
     """The page."""
-    rows = []
-    for name in sys.argv[1:] or CASES:
-        rows.append(row(name))
-        print(rows[-1], flush=True)
+    rows = printed(row, sys.argv[1:] or CASES)
     where = describe()
     page = f"""# Collapse of blocks in the plane
 

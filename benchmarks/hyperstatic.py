@@ -16,7 +16,7 @@ from pathlib import Path
 from typing import Any
 
 from classes import arch, spinning, wall
-from machine import describe
+from machine import describe, printed
 
 import amontons as am
 from amontons.mechanics.ready.packings import SpherePacking
@@ -97,10 +97,7 @@ def row(name: str) -> str:
 
 def main() -> None:
     """The page."""
-    rows = []
-    for name in sys.argv[1:] or CASES:
-        rows.append(row(name))
-        print(rows[-1], flush=True)
+    rows = printed(row, sys.argv[1:] or CASES)
     where = describe()
     page = f"""# Where W is singular or missing
 

@@ -2,6 +2,7 @@
 
 import os
 import platform
+from collections.abc import Callable, Iterable
 from importlib.metadata import version
 from pathlib import Path
 
@@ -18,3 +19,12 @@ def describe() -> dict[str, str]:
     versions = {name: version(name) for name in PACKAGES}
     cores = str(os.cpu_count())
     return {"cpu": cpu, "cores": cores, "python": platform.python_version(), **versions}
+
+
+def printed(row: Callable[[str], str], cases: Iterable[str]) -> list[str]:
+    """The rows of a table, one for each case, each printed as soon as it is there."""
+    rows = []
+    for case in cases:
+        rows.append(row(case))
+        print(rows[-1], flush=True)
+    return rows

@@ -75,16 +75,20 @@ class CurrentContact:
         give = self.law.give
         return 1 / self.rho if give is None or not self.framed else 1 / self.rho + give[:, 1]
 
+    @cached_property
+    def give(self) -> Array:
+        """C, (nc,), length per force."""
+        give = self.law.give
+        return np.zeros(len(self.rho)) if give is None else give[:, 0]
+
     def meet(self, positions: Array) -> Meetings:
         """Where the pairs meet at the positions (nodes, d) of all nodes."""
         return Meetings([pair.at(positions) for pair in self.pairs])
 
     def _mixed(self, force: Array, motion: Array, meeting: Meetings) -> Mixture | None:
         """What nodes that hardly anything faces have in the place of gap and motion."""
-        give = self.law.give
-        give = np.zeros(len(force)) if give is None else give[:, 0]
         offset = np.broadcast_to(self.law.offset, len(force))
-        return meeting.mixture(force, motion, (self.rho, give, offset), self.free)
+        return meeting.mixture(force, motion, (self.rho, self.give, offset), self.free)
 
     def local(
         self, force: Array, motion: Array, meeting: Meetings, drawn: Array | None = None,
@@ -156,15 +160,9 @@ class ContactPoint:
         return np.where(self.meeting.met, self.contact.law.cohesion, 0.0)
 
     @cached_property
-    def give(self) -> Array:
-        """C, (nc,), length per force."""
-        give = self.contact.law.give
-        return np.zeros(len(self.force)) if give is None else give[:, 0]
-
-    @cached_property
     def _stiffness_left(self) -> Array:
         """1 - rho C, (nc,): z_N by lambda . n."""
-        return 1.0 - self.contact.rho * self.give
+        return 1.0 - self.contact.rho * self.contact.give
 
     @property
     def tied(self) -> NDArray[np.bool_]:
@@ -202,7 +200,7 @@ class ContactPoint:
     def z_normal(self) -> Array:
         """z_N, (nc,): positive where closed; negative where nobody is met."""
         along = (self.n * self.force).sum(axis=1)
-        apart = self.gap + self.give * along + self.contact.law.offset
+        apart = self.gap + self.contact.give * along + self.contact.law.offset
         apart = self.contact.rho * apart
         closed = along + self.cohesion - apart
         return np.where(self.meeting.met, closed, -np.abs(along) - np.abs(apart))

@@ -157,9 +157,7 @@ class Fading:
         through = (self._beside * self._there(1 / self.areas)[:, None])[some][:, :, None]
         through = through * self._there(by_a)[some][..., None]
         f, slots = rows[some].shape
-        into = np.where(rows[some][:, :, None] >= 0,
-                        rows[some][:, :, None] * m + np.arange(m), -1)  # fmt: skip
-        blocks = [(through.reshape(f, slots * m, slots), into.reshape(f, slots * m),
+        blocks = [(through.reshape(f, slots * m, slots), _rows_of_each(rows[some], m),
                    np.maximum(rows[some], 0)),
                   (by_own[:, :, None], np.arange(nc)[:, None] * m + np.arange(m),
                    np.arange(nc)[:, None])]  # fmt: skip
@@ -180,11 +178,14 @@ class Fading:
         pairs = np.flatnonzero(some[of])
         place = (np.cumsum(some) - 1)[of[pairs]]
         values = np.einsum("ksqm,ksqw->ksmw", by_M[place], own[pairs][:, :, :slots])
-        at = rows[of[pairs]]
-        at = np.where(at[:, :, None] >= 0, at[:, :, None] * m + np.arange(m), -1)
-        count = len(pairs)
-        return (values.reshape(count, slots * m, dofs.shape[1]),
-                at.reshape(count, slots * m), dofs[pairs])  # fmt: skip
+        return (values.reshape(len(pairs), slots * m, dofs.shape[1]),
+                _rows_of_each(rows[of[pairs]], m), dofs[pairs])  # fmt: skip
+
+
+def _rows_of_each(rows: NDArray[np.int64], m: int) -> NDArray[np.int64]:
+    """The m rows of each contact in rows (f, a), -1 for none; (f, a m)."""
+    each = np.where(rows[:, :, None] >= 0, rows[:, :, None] * m + np.arange(m), -1)
+    return each.reshape(len(rows), rows.shape[1] * m)
 
 
 @dataclass(frozen=True, eq=False)
