@@ -41,7 +41,13 @@ from ...solvers.newton.states import PlainStates
 from ..contact.current import STICK, ContactPoint, Pieces
 from ..contact.current_pairs import Meetings
 from ..elements.linear_body import LinearBody
-from .moved_pairs import Linearisation, PairLinearisation, balanced, turned_forces
+from .moved_pairs import (
+    Linearisation,
+    PairLinearisation,
+    balanced,
+    kept_back,
+    turned_forces,
+)
 from .nodal_forces import NodalForces, nodal_forces
 from .nonlinear_parts import NonlinearParts, nonlinear_parts
 from .places_of_failure import places_of_failure
@@ -135,14 +141,26 @@ class LargeDeformation(NonlinearProblem):
         motion = meeting.motion(u, self.before.reshape(u.shape), self.earlier)
         return motion + self.drift, meeting
 
-    def _point(self, u: Array, rest: Array) -> tuple[ContactPoint, Array]:
-        """The law at displacements u (nodes, d), where the bodies need `rest` (dofs,).
+    def _point(
+        self, u: Array, needed: Array, pieces: Pieces | None = None
+    ) -> tuple[ContactPoint, Array]:
+        """The law at displacements u (nodes, d), where the bodies need `needed` (dofs,).
 
-        And these without what contacts give to other nodes.
+        And these without what contacts give to other nodes, by the active or given pieces.
         """
-        (motion, meeting), contact = self._meeting(u), self.parts.contact
-        rest = balanced(self.parts, meeting, rest)
-        return contact.at(rest[self.parts.at], motion, meeting, self.drawn, self.play), rest
+        (motion, meeting), parts = self._meeting(u), self.parts
+
+        def without(less: Array | None) -> tuple[ContactPoint, Array]:
+            rest = balanced(parts, meeting, needed, less)
+            known = motion, meeting, self.drawn, self.play
+            return parts.contact.at(rest[parts.at], *known), rest
+
+        point, rest = without(None)
+        if point.mixed is None:
+            return point, rest
+        for _ in range(parts.chained + 1):
+            point, rest = without(kept_back(point, pieces))
+        return point, rest
 
     def _needed(self, u: Array, pressures: Array | None = None) -> Array:
         """f_int - f (dofs,) at displacements u (nodes, d), or at given pressures, too."""
@@ -172,7 +190,7 @@ class LargeDeformation(NonlinearProblem):
         is not defined.
         """
         u = self.displacement(v)
-        point, rest = self._point(u, self._needed(u, pressures))
+        point, rest = self._point(u, self._needed(u, pressures), pieces)
         rest[self.parts.at] = point.residual(pieces)
         return rest[self.parts.free]
 
@@ -186,10 +204,10 @@ class LargeDeformation(NonlinearProblem):
         """F and its derivatives at a state; pressures as in `residual`."""
         u = self.displacement(v)
         needed, blocks = self._needed_slopes(u, pressures)
-        point, rest = self._point(u, needed)
+        point, rest = self._point(u, needed, pieces)
         if not point.meeting.only_obstacles:
             return PairLinearisation(
-                self.parts, u, needed, rest, blocks, point, self.earlier, point.partials(pieces)
+                self.parts, u, rest, blocks, point, self.earlier, pieces
             )
         return Linearisation(self.parts, u, rest, blocks, point, *point.derivatives(pieces))
 
