@@ -41,15 +41,10 @@ from ...solvers.newton.states import PlainStates
 from ..contact.current import STICK, ContactPoint, Pieces
 from ..contact.current_pairs import Meetings
 from ..elements.linear_body import LinearBody
-from .moved_pairs import (
-    Linearisation,
-    PairLinearisation,
-    balanced,
-    kept_back,
-    turned_forces,
-)
+from .moved_pairs import PairLinearisation, balanced, balanced_law
 from .nodal_forces import NodalForces, nodal_forces
 from .nonlinear_parts import NonlinearParts, nonlinear_parts
+from .obstacle_linearisation import Linearisation, turned_forces
 from .places_of_failure import places_of_failure
 from .pressure_states import PressureStates
 
@@ -148,19 +143,8 @@ class LargeDeformation(NonlinearProblem):
 
         And these without what contacts give to other nodes, by the active or given pieces.
         """
-        (motion, meeting), parts = self._meeting(u), self.parts
-
-        def without(less: Array | None) -> tuple[ContactPoint, Array]:
-            rest = balanced(parts, meeting, needed, less)
-            known = motion, meeting, self.drawn, self.play
-            return parts.contact.at(rest[parts.at], *known), rest
-
-        point, rest = without(None)
-        if point.mixed is None:
-            return point, rest
-        for _ in range(parts.chained + 1):
-            point, rest = without(kept_back(point, pieces))
-        return point, rest
+        known = *self._meeting(u), self.drawn, self.play
+        return balanced_law(self.parts, needed, known, pieces)
 
     def _needed(self, u: Array, pressures: Array | None = None) -> Array:
         """f_int - f (dofs,) at displacements u (nodes, d), or at given pressures, too."""
@@ -202,14 +186,12 @@ class LargeDeformation(NonlinearProblem):
         self, v: Array, pieces: Pieces | None = None, pressures: Array | None = None
     ) -> Linearisation | PairLinearisation:
         """F and its derivatives at a state; pressures as in `residual`."""
-        u = self.displacement(v)
+        parts, u = self.parts, self.displacement(v)
         needed, blocks = self._needed_slopes(u, pressures)
         point, rest = self._point(u, needed, pieces)
         if not point.meeting.only_obstacles:
-            return PairLinearisation(
-                self.parts, u, rest, blocks, point, self.earlier, pieces
-            )
-        return Linearisation(self.parts, u, rest, blocks, point, *point.derivatives(pieces))
+            return PairLinearisation(parts, u, rest, blocks, point, self.earlier, pieces)
+        return Linearisation(parts, u, rest, blocks, point, *point.derivatives(pieces))
 
     def pieces(self, v: Array) -> Pieces:
         """The active piece of the law at every contact, see `ContactPoint.pieces`."""

@@ -20,8 +20,8 @@ nilpotent: (I + C O)^-1 = I - C O + (C O)^2 - ..., with as many terms as the cha
 Nodes of which hardly anything faces the master, `contact.fading`, have averages B that are
 extrapolations from a sliver of width d: these change by 1 / d and are told to eps / d^2 only.
 What the law gives such a node is next to nothing, but lambda, which its body asks for, may be
-anything away from a solution.  With the weight w_p of (2) there and the residual law_p, other
-nodes get
+anything away from a solution.  With the weight w_p of (2) there and law_p, (2) of
+`contact.current`, other nodes get
 
     lambda_p - (1 - w_p) law_p                                                              (3)
 
@@ -80,6 +80,24 @@ def _carried(parts: NonlinearParts, meeting: Meetings) -> Array:
     return parts.contact.free * meeting.met[:, None].astype(float)
 
 
+def balanced_law(
+    parts: NonlinearParts, needed: Array,
+    known: tuple[Array, Meetings, Array | None, Array | None], pieces: Pieces | None = None,
+) -> tuple[ContactPoint, Array]:  # fmt: skip
+    """The law, and `balanced`, with (3) by the active or given pieces.
+
+    known: s, where contacts meet, drawn and play of `CurrentContact.at`.
+    """
+    rest = balanced(parts, known[1], needed)
+    point = parts.contact.at(rest[parts.at], *known)
+    if point.mixed is None:
+        return point, rest
+    for _ in range(parts.chained + 1):  # forces on the next pair of a chain follow
+        rest = balanced(parts, known[1], needed, kept_back(point, pieces))
+        point = parts.contact.at(rest[parts.at], *known)
+    return point, rest
+
+
 def kept_back(point: ContactPoint, pieces: Pieces | None = None) -> Array | None:
     """(1 - w) law of (3), (nc, d), of the active or given pieces; None where nothing fades."""
     if point.mixed is None:
@@ -100,71 +118,6 @@ def _unchained(parts: NonlinearParts, others: sparse.csr_array, gathered: Any) -
 def _others(parts: NonlinearParts, meeting: Meetings) -> sparse.csr_array:
     """Forces on other nodes per force on the slaves, (dofs, nc d)."""
     return meeting.returned(_carried(parts, meeting))
-
-
-@dataclass(frozen=True, eq=False)
-class Linearisation:
-    """F and its derivatives at one state, with obstacles alone.
-
-    u (nodes, d): displacements; rest (dofs,): f_int - f; blocks: its derivative; by_force,
-    by_x, by_motion (nc, d, d): those of the contact law.
-    """
-
-    parts: NonlinearParts
-    u: Array
-    rest: Array
-    blocks: Array
-    point: ContactPoint
-    by_force: Array
-    by_x: Array
-    by_motion: Array
-
-    @property
-    def residual(self) -> Array:
-        """F, (n,)."""
-        parts = self.parts
-        out = self.rest.copy()
-        out[parts.at] = self.point.residual()
-        return out[parts.free]
-
-    @cached_property
-    def matrix(self) -> sparse.csc_array:
-        """dF/dv, (n, n)."""
-        parts = self.parts
-        blocks = self.blocks.copy()
-        rows = np.flatnonzero(parts.row_contact >= 0)
-        blocks[rows] = self.by_force[parts.row_contact[rows]] @ blocks[rows]
-        blocks[parts.diagonal] += self.by_x + self.by_motion
-        return parts.on_free(blocks)
-
-    def shifted(
-        self, load: NodalForces | Array, prescribed: Array, drift: Array | None = None
-    ) -> Array:
-        """First-order change of F, (n,), with changes of load, prescribed (dofs,) and drift."""
-        parts = self.parts
-        change = parts.matrix(self.blocks) @ prescribed - NodalForces.of(load).at(self.u)
-        out = self.passed(change)
-        if drift is not None:
-            out += self.with_law(np.einsum("pij,pj->pi", self.by_motion, drift))
-        return out
-
-    @property
-    def structure(self) -> Structure:
-        """What the matrix consists of."""
-        nothing = sparse.csr_array((len(self.parts.free), self.parts.at.size))
-        return structure_of(self.parts, self.u, self.by_force, nothing)
-
-    def with_law(self, change: Array) -> Array:
-        """First-order change of F, (n,), with a change of the law at contacts, (nc, d)."""
-        out = np.zeros(len(self.rest))
-        out[self.parts.at] = change
-        return out[self.parts.free]
-
-    def passed(self, change: Array) -> Array:
-        """First-order change of F, (n,), with a change of f_int - f, (dofs,)."""
-        parts, out = self.parts, change.copy()
-        out[parts.at] = np.einsum("pij,pj->pi", self.by_force, change[parts.at])
-        return out[parts.free]
 
 
 @dataclass(frozen=True, eq=False)
@@ -399,13 +352,3 @@ def _at_slaves(part: Meeting, values: Array, dofs: int) -> sparse.csr_array:
     columns = part.slaves[:, None, None] * d + np.arange(d)
     entries = (values.ravel(), (rows.ravel(), np.broadcast_to(columns, values.shape).ravel()))
     return sparse.coo_array(entries, shape=(nc * m, dofs)).tocsr()
-
-
-def turned_forces(axes: Array, r: Array, bend: Array) -> Array:
-    """Derivative of the forces sum_k r_k axis_k by the position, (nc, d, d).
-
-    dn = bend dx, and tangents are carried along: dt = -n (t . dn).
-    """
-    n, t = axes[:, 0], axes[:, 1:]
-    along = np.einsum("pk,pkc,pcj->pj", r[:, 1:], t, bend)
-    return r[:, 0, None, None] * bend - n[:, :, None] * along[:, None, :]
