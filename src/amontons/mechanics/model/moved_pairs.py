@@ -77,7 +77,7 @@ def balanced(
 
 def _carried(parts: NonlinearParts, meeting: Meetings) -> Array:
     """1 for components of forces that contacts take, (nc, d), 0 for the others."""
-    return parts.contact.free * meeting.met[:, None].astype(float)
+    return (parts.contact.free & meeting.met[:, None]).astype(np.float64)
 
 
 def balanced_law(
