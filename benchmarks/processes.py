@@ -40,7 +40,8 @@ COLUMNS = ("kind", "cells an edge", "unknowns", "contacts", "processes", "wall s
 WORDS = (
     "The cube of examples/distributed.py to 1e-8, making the mesh included. Peaks are of whole "
     "processes: some 230 MB of each are Python and its libraries. Messages and sums contain "
-    "those of a small solve before; without PETSc the same solve has run before. Load: processes that want a core, before each run."
+    "those of a small solve before; without PETSc the same solve has run before. Load: "
+    "processes that want a core, before each run."
 )
 
 
