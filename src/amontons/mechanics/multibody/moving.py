@@ -8,12 +8,24 @@ own axes, to the end of a step h:
     x1 = x0 + h (v0 + v1) / 2,  Q1 = Q0 exp(h (W0 + W1) / 2)
 
 with W_f after a step without contact (`rows.turned_freely`).  Contacts whose gap at the
-midpoint is not positive take part, with the law between r and u1 + e min(u0_N, 0).  What an
+midpoint is not positive take part, with the law between r and u1 + e u0_N ([M]; with min(u0_N,
+0) a contact that parts and is pressed by another impact would gain energy).  What an
 impact leaves of overlap, h |u_N| / 2 at most, and joints lose by turning, is mended where it is
 more than `overlap`: by the smallest displacements, in the metric of the masses, that take it
 away.  What was mended takes part, though rotations open it by their squares.  (A law that lets
 open contacts close without overlap, u1_N >= -gap / h, turns a rocking block round a step too
 early at each impact; at the same step its times are wrong by six times as much.)
+
+Joints have the law of their mean velocity, with u_m of the velocities before the step and the
+arms at its middle, u_b of the same at its beginning:
+
+    u1 = -(u_m - u_b)
+
+What the joint has turned away from within half a step, u_m - u_b, is taken back beyond the
+middle, so that its impulse does no work on it, as none does in truth; u_b, of second order in h
+but after jolts, is taken away as by an impact without rebound.  (u1 = 0, the law of sticking
+contacts, takes from a pendulum a part of its energy that is of first order in h: 7 % in five
+swings of a thousand steps each.)
 
 Gravity that changes in time is that of the middle of a step.
 
@@ -46,7 +58,7 @@ from .ends import ended, freely, middle_of
 from .meeting import Meetings, meetings
 from .quick import Found, Posed, law_of, matched, pose
 from .rolling import couples, rolling_problem
-from .rows import Rows, delassus, impulses, rotations, rows_at, turned
+from .rows import Rows, delassus, impulses, rotations, rows_at, turned, velocities
 from .states import Motion, RigidEnergies, RigidState, RigidStep
 from .sweeping import Search, found_quickly
 
@@ -191,6 +203,8 @@ class _Stepping:
                 at.rows, nc, (masses, self.inverse, R), (before.velocity, before.spin), free,
                 self.system.restitution, at.keys, (state.keys, state.impulses),
             ))  # fmt: skip
+            if len(at.apart):
+                posed.q[nc:] += self._turned_away(at.rows, nc, R, before, free[1])
             what = f"step {state.index + 1}"
             if self.system.has_moments:
                 solved = self._rolled(at, R, posed, free[1], state, what, deadline)
@@ -236,6 +250,24 @@ class _Stepping:
         left: list[Any] = [a[kept] for a in found._replace(gaps=gaps)]
         those: list[Any] = [a[rows] for a in at.rows]
         return _Met(Meetings(*left), at.keys[kept], Rows(*those), at.apart, 0.0)
+
+    def _turned_away(self, rows: Rows, nc: int, R: Array, before: Any, spin: Array) -> Array:
+        """u_m - u_b of the joints, (k, 3), behind nc contacts; spin (n, 3): W_f."""
+        joints = Rows(*(part[nc:] for part in rows))
+        first = rotations(before.orientation)
+        back = first @ R.swapaxes(1, 2)  # from the middle to the beginning
+        arms = np.einsum("jik,jk->ji", back[joints.slave], joints.arms)
+        others = np.where(
+            (joints.master == GROUND)[:, None], joints.master_arms,
+            np.einsum("jik,jk->ji", back[joints.master], joints.master_arms),
+        )  # fmt: skip
+        begun = joints._replace(arms=arms, master_arms=others)
+        middle, begin = (
+            velocities(those, before.velocity, np.einsum("bij,bj->bi", turn, own))
+            for those, turn, own in ((joints, R, spin), (begun, first, before.spin))
+        )
+        jolt = (middle * begin).sum(axis=1) > 0.5 * (begin**2).sum(axis=1)  # else it gains energy
+        return middle - np.where(jolt[:, None], begin, 0.0)
 
     # ------------------------------------------------------------------ problems
     def _solve(
