@@ -141,7 +141,8 @@ class _Spectrum:
 
     def __init__(self, l: Array, P: Array, p: float) -> None:
         self.p = p
-        values, left, right = linalg.eig(np.diag(l) - p * P, left=True, right=True)
+        found: Any = linalg.eig(np.diag(l) - p * P, left=True, right=True)
+        values, left, right = found
         real = np.flatnonzero(values.imag == 0.0)
         real = real[np.argsort(values.real[real], kind="stable")]
         self.pairs = values[values.imag > 0]

@@ -256,7 +256,8 @@ class _Stepping:
 
     def _taken_back(self, rows: Rows, nc: int, R: Array, before: Any, spin: Array) -> Array:
         """(1 - c) u_m of the joints, (k, 3), behind nc contacts; spin (n, 3): W_f."""
-        joints = Rows(*(part[nc:] for part in rows))
+        those: list[Any] = [part[nc:] for part in rows]
+        joints = Rows(*those)
         begin = rotations(before.orientation)
         back = begin @ R.swapaxes(1, 2)  # from the middle to the beginning
         arms, others = (
@@ -268,8 +269,8 @@ class _Stepping:
         others = np.where((joints.master == GROUND)[:, None], joints.master_arms, others)
         begun = joints._replace(arms=arms, master_arms=others)
         u_m, u_b = (
-            velocities(those, before.velocity, np.einsum("bij,bj->bi", turn, own))
-            for those, turn, own in ((joints, R, spin), (begun, begin, before.spin))
+            velocities(at, before.velocity, np.einsum("bij,bj->bi", turn, own))
+            for at, turn, own in ((joints, R, spin), (begun, begin, before.spin))
         )
         jolt, size = (
             np.bincount(self.together, weights=(u_m * u).sum(axis=1)) for u in (u_b, u_m)
