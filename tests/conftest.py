@@ -1,5 +1,6 @@
 """Fixtures for all tests: no window opens, and the shared folder of data is optional."""
 
+import gc
 import os
 from pathlib import Path
 
@@ -18,6 +19,12 @@ def pytest_configure(config: pytest.Config) -> None:
     # the first example of a test may compile: no deadline, but the same examples every time
     hypothesis.settings.register_profile("amontons", deadline=None, derandomize=True)
     hypothesis.settings.load_profile("amontons")
+
+
+def pytest_collection_finish() -> None:
+    """Tests and modules stay to the end: no search for cycles needs to go through them."""
+    gc.collect()
+    gc.freeze()
 
 
 @pytest.fixture(scope="session")
