@@ -262,7 +262,7 @@ def turned_freely(inertia, spin, h):
     """
     out = spin.copy()
     mean, moment, rest, unit = np.empty(3), np.empty(3), np.empty(3), np.empty(3)
-    slope = np.empty((3, 3))  # columns by rows
+    slope = np.empty((3, 3))
     for b in range(len(spin)):
         J, before, after = inertia[b], spin[b], out[b]
         size = max(abs(before[0]), abs(before[1]), abs(before[2]))
@@ -282,28 +282,42 @@ def turned_freely(inertia, spin, h):
                     unit[i] = 1.0 if i == k else 0.0
                 one, two = _cross(unit, moment), _cross(mean, J[:, k])
                 for i in range(3):
-                    slope[k, i] = J[i, k] + 0.5 * h * (one[i] + two[i])
+                    slope[i, k] = J[i, k] + 0.5 * h * (one[i] + two[i])
+            _solve_inplace(slope, rest)
             moved = 0.0
-            change = _solved(slope, rest)
             for i in range(3):
-                after[i] -= change[i]
-                moved = max(moved, abs(change[i]))
+                after[i] -= rest[i]
+                moved = max(moved, abs(rest[i]))
             if moved <= CLOSE * size:
                 break
     return out
 
 
 @njit(cache=True, error_model="numpy")
-def _solved(columns, b):
-    """x with sum_k x_k columns_k = b in 3D, by Cramer's rule."""
-    c0, c1, c2 = columns[0], columns[1], columns[2]
-    one, two, three = _cross(c1, c2), _cross(c2, c0), _cross(c0, c1)
-    det = c0[0] * one[0] + c0[1] * one[1] + c0[2] * one[2]
-    return (
-        (b[0] * one[0] + b[1] * one[1] + b[2] * one[2]) / det,
-        (b[0] * two[0] + b[1] * two[1] + b[2] * two[2]) / det,
-        (b[0] * three[0] + b[1] * three[1] + b[2] * three[2]) / det,
-    )
+def _solve_inplace(A, b):
+    """b (3,) becomes A^-1 b; A (3, 3) is eliminated, largest pivots first.
+
+    Raises LinAlgError where that is no number.
+    """
+    for k in range(3):
+        best = k
+        for i in range(k + 1, 3):
+            if abs(A[i, k]) > abs(A[best, k]):
+                best = i
+        for j in range(k, 3):
+            A[k, j], A[best, j] = A[best, j], A[k, j]
+        b[k], b[best] = b[best], b[k]
+        for i in range(k + 1, 3):
+            factor = A[i, k] / A[k, k]
+            for j in range(k + 1, 3):
+                A[i, j] -= factor * A[k, j]
+            b[i] -= factor * b[k]
+    for k in range(2, -1, -1):
+        for j in range(k + 1, 3):
+            b[k] -= A[k, j] * b[j]
+        b[k] /= A[k, k]
+        if not np.isfinite(b[k]):
+            raise np.linalg.LinAlgError("the turning of a body is not finite")
 
 
 @njit(cache=True, error_model="numpy")
@@ -361,6 +375,8 @@ def levers_of(slave, master, axes, arms, master_arms, masses, inverse):  # noqa:
                 left = inverse[b, d, e]
                 for k in range(e):
                     left -= C[b, d, k] * C[b, e, k]
+                if d == e and not left > 0.0:
+                    raise np.linalg.LinAlgError("the inertia of a body is not definite")
                 C[b, d, e] = np.sqrt(left) if d == e else left / C[b, e, e]
     for i in range(n):
         for p in range(2):
