@@ -90,6 +90,7 @@ def main():
     for problem in problems():
         for method in METHODS:
             attempt(method.__name__, problem, method())
+        attempt("adaptive", problem, am.GaussSeidel(batch=am.Batch.ADAPTIVE))
     attempt("levels", without_levels(), am.ContactMultigrid())
     for model in (*models(), *sliding()):
         attempt("model", model)

@@ -7,6 +7,7 @@ that AMONTONS_BASELINE names: `x86-64-v3` or `generic`.  What does not compile i
 said; at last everything is loaded once, and an error raised where that fails.
 """
 
+import gc
 import importlib
 import os
 import subprocess
@@ -33,6 +34,7 @@ def begin(sources, above):
     sys.path.insert(0, sources)
     os.environ["NUMBA_CACHE_DIR"] = tempfile.mkdtemp(dir=above)  # loaded ones do not pack
     os.environ.pop("AMONTONS_RECORD_KERNELS", None)
+    gc.set_threshold(20_000, 10, 10)  # searching for cycles took a tenth of the time
     level = os.environ.get("AMONTONS_BASELINE", "")
     if level:
         os.environ.update(NUMBA_CPU_NAME=level, NUMBA_CPU_FEATURES="")

@@ -93,7 +93,7 @@ SCALARS = st.one_of(
 )  # fmt: skip
 
 
-@FUZZ
+@settings(FUZZ, max_examples=150)
 @given(st.integers(0, len(CASE) - 1), st.integers(0, 12), st.text(max_size=6))
 def test_case_files_with_replaced_text(tmp_path, start, length, text):
     path = tmp_path / "case.toml"
@@ -120,7 +120,7 @@ PATHS = st.sampled_from([
 ])  # fmt: skip
 
 
-@FUZZ
+@settings(FUZZ, max_examples=150)
 @given(PATHS, SCALARS)
 def test_overrides_with_any_value(tmp_path, path, value):
     file = tmp_path / "case.toml"

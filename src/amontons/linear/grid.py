@@ -15,6 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..core.compiled import njit
+from ..core.copies import copy_rows_inplace
 from ..core.threads import over_rows
 from .node_blocks import NodeBlocks, block_inverse
 from .work import Work
@@ -307,7 +308,7 @@ def _grid_pass(begin, end, shape, values, lines, shifts, stencils, inverses, use
                 if not inside:
                     buffer[3 * l : 3 * l + 3] = 0.0
                 elif dy < 2 and y > 0 and line > begin:  # was the next line of the one before
-                    buffer[3 * l : 3 * l + 3] = buffer[3 * l + 3 : 3 * l + 6]
+                    copy_rows_inplace(buffer[3 * l + 3 : 3 * l + 6], buffer[3 * l : 3 * l + 3])
                 else:
                     _load(x, ((z + dz - 1) * ny + y + dy - 1) * nx, nx, buffer, l)
         kind = 3 * cz + cy

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from scipy import sparse
 
 from ..core.compiled import njit
+from ..core.copies import copy_rows_inplace
 from ..core.threads import over_rows
 from .box_transfer import add_in_box, restrict_in_box
 from .node_blocks import NodeBlocks, row_product, with_diagonal
@@ -302,9 +303,11 @@ def _sort_rows(ptr, idx, data):
     """Columns of every row in ascending order, in place."""
     for i in range(len(ptr) - 1):
         first, last = ptr[i], ptr[i + 1]
-        order = np.argsort(idx[first:last])
-        idx[first:last] = idx[first:last][order]
-        data[first:last] = data[first:last][order]
+        columns, blocks = idx[first:last].copy(), data[first:last].copy()
+        order = np.argsort(columns)
+        for k in range(last - first):
+            idx[first + k] = columns[order[k]]
+            copy_rows_inplace(blocks[order[k]], data[first + k])
 
 
 @njit(cache=True)

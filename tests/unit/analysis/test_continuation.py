@@ -221,7 +221,7 @@ def random_path(seed, nc):
     ))  # fmt: skip
 
 
-@settings(max_examples=200, deadline=None, derandomize=True)
+@settings(max_examples=80, deadline=None, derandomize=True)
 @given(st.integers(0, 10**6), st.integers(1, 4))
 def test_both_methods_walk_the_same_curve(seed, nc):
     path = random_path(seed, nc)

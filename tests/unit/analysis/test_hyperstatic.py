@@ -58,7 +58,7 @@ def test_three_legs_leave_the_floor_only_horizontal_forces_to_choose():
 
 
 def test_what_is_attained_solves_the_problem_with_the_same_motion():
-    problem = SpherePacking(60, mu=0.8, seed=3).problem(1e-3)
+    problem = SpherePacking(40, mu=0.8, seed=3).problem(1e-3)
     solution = am.solve(problem, tolerance=1e-10)
     apart = am.uniqueness(problem, solution, time_limit=30).indeterminacy
     other = apart.reactions.other

@@ -37,13 +37,13 @@ def test_all_three_solutions_of_a_block_between_its_folds():
     assert "no proof" in str(found)
     for solution in found.solutions:
         assert solution.convergence.error < 1e-9
-    outside = am.multistart(block(0.4), starts=20)
+    outside = am.multistart(block(0.4), starts=8)
     assert len(outside) == 1
 
 
 def test_a_strip_between_two_bodies_buckles_to_either_side():
     model = strip(0.08)
-    found = am.multistart(model)
+    found = am.multistart(model, starts=24)
     middle = int(np.argmin(np.abs(model.bodies[0].mesh.points - [0, 0.5]).sum(axis=1)))
     aside = sorted(
         float(model.discrete_problem().displacement(solution.v)[middle, 0])

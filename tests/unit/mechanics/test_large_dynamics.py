@@ -55,12 +55,12 @@ def momenta(body, state):
 
 
 @pytest.mark.parametrize(("size", "law", "steps"), [
-    ((1.0, 0.6), SOFT, 240),
+    ((1.0, 0.6), SOFT, 120),
     ((1.0, 0.6), am.MooneyRivlin(15.0, 2.0, 400.0, density=1.0), 60),
     ((1.0, 0.6, 0.3), SOFT, 60),
 ])  # fmt: skip
 def test_a_free_block_that_spins_keeps_all(size, law, steps):
-    """In steps of a third of a period of its first vibration; the first makes two turns."""
+    """In steps of a third of a period of its first vibration; the first makes a turn."""
     body = am.Body(am.box(size, 2), law)
 
     def velocity(x):
@@ -83,12 +83,12 @@ def test_steps_are_of_second_order():
     body = am.Body(am.box((1.0, 0.5), (2, 1)), SOFT)
     model = am.Model([body], [am.Fix("left", (0, 0))], [], [am.BodyForce((0.0, -20.0))])
     ends = {}
-    for h in (0.02, 0.01, 0.005, 0.00125):
+    for h in (0.02, 0.01, 0.0025):
         *_, step = am.evolve(model, am.MoreauJean(h), until=0.2)
         ends[h] = step.state.displacement
-    off = [abs(ends[h] - ends[0.00125]).max() for h in (0.02, 0.01, 0.005)]
+    off = [abs(ends[h] - ends[0.0025]).max() for h in (0.02, 0.01)]
     assert 3.3 < off[0] / off[1] < 4.8
-    assert abs(ends[0.005]).max() > 0.05
+    assert abs(ends[0.0025]).max() > 0.05
 
 
 def dropped(restitution, mu, law, until=0.6, h=0.005):

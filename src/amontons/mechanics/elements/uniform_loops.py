@@ -13,6 +13,7 @@ from __future__ import annotations
 import numpy as np
 
 from ...core.compiled import njit
+from ...core.copies import copy_rows_inplace
 from .cell_loops import _inverse_transposed, _matrices, _scatter
 from .point_loops import _push
 
@@ -67,7 +68,7 @@ def modes_energy(u, nodes, gamma, K, F, unit):
     y, w = np.zeros((count, dim)), np.zeros((count, dim))
     total = 0.0
     for k in range(len(nodes)):
-        at[:] = F[k]
+        copy_rows_inplace(F[k], at)
         _inverse_transposed(at, H, unit)
         _modes(u, nodes[k], gamma[k], K[k], H, y, w, unit)
         for m in range(count):
@@ -89,7 +90,7 @@ def least_ratio(u, nodes, gamma, slopes, F, unit):
     none = np.zeros((count, dim, count, dim))
     least = np.inf
     for k in range(len(nodes)):
-        at[:] = F[k]
+        copy_rows_inplace(F[k], at)
         _inverse_transposed(at, H, unit)
         _modes(u, nodes[k], gamma[k], none, H, y, w, unit)
         for q in range(len(slopes)):
@@ -113,7 +114,7 @@ def uniform_forces_inplace(u, nodes, mean, volumes, gamma, K, F, S, out, unit):
     H, at, P, _, _ = _matrices()
     y, w = np.zeros((count, dim)), np.zeros((count, dim))
     for k in range(len(nodes)):
-        at[:] = F[k]
+        copy_rows_inplace(F[k], at)
         _inverse_transposed(at, H, unit)
         _modes(u, nodes[k], gamma[k], K[k], H, y, w, unit)
         for i in range(dim):
@@ -154,7 +155,7 @@ def uniform_tangent_inplace(
     pushed, along = np.zeros((dim, dim, dim)), np.zeros(dim)
     for k in range(len(nodes)):
         local[:] = 0.0
-        at[:] = F[k]
+        copy_rows_inplace(F[k], at)
         _inverse_transposed(at, H, unit)
         _modes(u, nodes[k], gamma[k], K[k], H, y, w, unit)
         for a in range(nodes_of):

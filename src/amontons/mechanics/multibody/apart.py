@@ -9,6 +9,7 @@ from __future__ import annotations
 import numpy as np
 
 from ...core.compiled import njit
+from ...core.copies import copy_inplace
 
 PARALLEL = 1e-6  # sine below which two edges have no common normal
 
@@ -94,5 +95,5 @@ def edges_apart(i, j, first_vertex, v, edges, first_line, lines, x):  # noqa: PL
                 continue
             if not _beyond(m, first_vertex[j], first_vertex[j + 1], v, -1.0, bottom + size):
                 best, one, two = -bottom - top, a, b
-                normal[:] = m
+                copy_inplace(m, normal)
     return best, one, two, normal

@@ -19,6 +19,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...core.compiled import njit
+from ...core.copies import copy_rows_inplace
 from ...linear.block_kernels import WELL_CONDITIONED
 from ...linear.blocks import BlockRows
 from ...problem.friction import FrictionProblem
@@ -180,7 +181,10 @@ def eliminated_of(data, diagonal):
     out, rho = np.zeros((len(diagonal), 17)), np.zeros(len(diagonal))
     for i in range(len(diagonal)):
         A, e = data[diagonal[i]], out[i]
-        size = np.abs(A).max()
+        size = 0.0
+        for a in range(3):
+            for b in range(3):
+                size = max(size, abs(A[a, b]))
         minor0 = A[1, 1] * A[2, 2] - A[1, 2] * A[2, 1]
         minor1 = A[1, 0] * A[2, 2] - A[1, 2] * A[2, 0]
         minor2 = A[1, 0] * A[2, 1] - A[1, 1] * A[2, 0]
@@ -278,5 +282,5 @@ def solved(  # noqa: PLR0913
             if error <= goal:
                 return r, told, done, error / size, worst, contact
             break
-        r[:, :] = kept
+        copy_rows_inplace(kept, r)
     return r, told, -1, math.inf, math.inf, -1

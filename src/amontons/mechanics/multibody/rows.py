@@ -54,20 +54,30 @@ def impulses(rows: Rows, r: Array, bodies: int) -> tuple[Array, Array]:
 
 
 @njit(cache=True, error_model="numpy")
+def _cross(a, b):
+    """a x b; written out, as numpy's takes seconds to compile."""
+    return (
+        a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]
+    )  # fmt: skip
+
+
+@njit(cache=True, error_model="numpy")
 def frames_of(normals):
     """Normal and two tangents, (n, 3, 3) by rows, right-handed."""
-    out = np.empty((len(normals), 3, 3))
+    out, helper = np.empty((len(normals), 3, 3)), np.empty(3)
     for i in range(len(normals)):
-        n = normals[i]
+        n, first, second = normals[i], out[i, 1], out[i, 2]
         least = 0
         for k in range(1, 3):
             if abs(n[k]) < abs(n[least]):
                 least = k
-        helper = np.zeros(3)
-        helper[least] = 1.0
-        first = np.cross(n, helper)
-        first = first / np.sqrt((first * first).sum())
-        out[i, 0], out[i, 1], out[i, 2] = n, first, np.cross(n, first)
+        for k in range(3):
+            out[i, 0, k], helper[k] = n[k], 1.0 if k == least else 0.0
+        first[0], first[1], first[2] = _cross(n, helper)
+        length = np.sqrt(first[0] * first[0] + first[1] * first[1] + first[2] * first[2])
+        for k in range(3):
+            first[k] /= length
+        second[0], second[1], second[2] = _cross(n, first)
     return out
 
 
@@ -214,12 +224,14 @@ def row_velocities(slave, master, axes, arms, master_arms, v, omega):  # noqa: P
     u = np.empty((len(slave), 3))
     for c in range(len(slave)):
         b = slave[c]
-        at = v[b] + np.cross(omega[b], arms[c])
+        x, y, z = _cross(omega[b], arms[c])
+        x, y, z = v[b, 0] + x, v[b, 1] + y, v[b, 2] + z
         if master[c] >= 0:
             b = master[c]
-            at = at - v[b] - np.cross(omega[b], master_arms[c])
+            e, f, g = _cross(omega[b], master_arms[c])
+            x, y, z = x - v[b, 0] - e, y - v[b, 1] - f, z - v[b, 2] - g
         for k in range(3):
-            u[c, k] = (axes[c, k] * at).sum()
+            u[c, k] = axes[c, k, 0] * x + axes[c, k, 1] * y + axes[c, k, 2] * z
     return u
 
 
@@ -227,15 +239,18 @@ def row_velocities(slave, master, axes, arms, master_arms, v, omega):  # noqa: P
 def row_impulses(slave, master, axes, arms, master_arms, r, bodies):  # noqa: PLR0913
     """`impulses`, for kernels."""
     push, turn = np.zeros((bodies, 3)), np.zeros((bodies, 3))
+    p = np.empty(3)
     for c in range(len(slave)):
-        p = np.zeros(3)
-        for k in range(3):
-            p += r[c, k] * axes[c, k]
-        push[slave[c]] += p
-        turn[slave[c]] += np.cross(arms[c], p)
-        if master[c] >= 0:
-            push[master[c]] -= p
-            turn[master[c]] -= np.cross(master_arms[c], p)
+        for d in range(3):
+            p[d] = r[c, 0] * axes[c, 0, d] + r[c, 1] * axes[c, 1, d] + r[c, 2] * axes[c, 2, d]
+        for side in range(2):
+            b, arm = (slave[c], arms[c]) if side == 0 else (master[c], master_arms[c])
+            if b < 0:
+                continue
+            sign, torque = 1.0 if side == 0 else -1.0, _cross(arm, p)
+            for d in range(3):
+                push[b, d] += sign * p[d]
+                turn[b, d] += sign * torque[d]
     return push, turn
 
 
@@ -246,26 +261,63 @@ def turned_freely(inertia, spin, h):
     J (W1 - W0) + h W x J W = 0 with the mean W of both, which keeps the energy exactly.
     """
     out = spin.copy()
+    mean, moment, rest, unit = np.empty(3), np.empty(3), np.empty(3), np.empty(3)
+    slope = np.empty((3, 3))
     for b in range(len(spin)):
-        J, before = inertia[b], spin[b]
-        after = before.copy()
+        J, before, after = inertia[b], spin[b], out[b]
+        size = max(abs(before[0]), abs(before[1]), abs(before[2]))
         for _ in range(STEPS):
-            mean = 0.5 * (before + after)
-            moment = J @ mean
-            rest = J @ (after - before) + h * np.cross(mean, moment)
-            slope = np.empty((3, 3))
+            for i in range(3):
+                mean[i] = 0.5 * (before[i] + after[i])
+            for i in range(3):
+                moment[i] = rest[i] = 0.0
+                for k in range(3):
+                    moment[i] += J[i, k] * mean[k]
+                    rest[i] += J[i, k] * (after[k] - before[k])
+            turning = _cross(mean, moment)
+            for i in range(3):
+                rest[i] += h * turning[i]
             for k in range(3):
-                unit = np.zeros(3)
-                unit[k] = 1.0
-                slope[:, k] = J[:, k] + 0.5 * h * (
-                    np.cross(unit, moment) + np.cross(mean, J[:, k])
-                )
-            change = np.linalg.solve(slope, rest)
-            after = after - change
-            if np.abs(change).max() <= CLOSE * np.abs(before).max():
+                for i in range(3):
+                    unit[i] = 1.0 if i == k else 0.0
+                one, two = _cross(unit, moment), _cross(mean, J[:, k])
+                for i in range(3):
+                    slope[i, k] = J[i, k] + 0.5 * h * (one[i] + two[i])
+            _solve_inplace(slope, rest)
+            moved = 0.0
+            for i in range(3):
+                after[i] -= rest[i]
+                moved = max(moved, abs(rest[i]))
+            if moved <= CLOSE * size:
                 break
-        out[b] = after
     return out
+
+
+@njit(cache=True, error_model="numpy")
+def _solve_inplace(A, b):
+    """b (3,) becomes A^-1 b; A (3, 3) is eliminated, largest pivots first.
+
+    Raises LinAlgError where that is no number.
+    """
+    for k in range(3):
+        best = k
+        for i in range(k + 1, 3):
+            if abs(A[i, k]) > abs(A[best, k]):
+                best = i
+        for j in range(k, 3):
+            A[k, j], A[best, j] = A[best, j], A[k, j]
+        b[k], b[best] = b[best], b[k]
+        for i in range(k + 1, 3):
+            factor = A[i, k] / A[k, k]
+            for j in range(k + 1, 3):
+                A[i, j] -= factor * A[k, j]
+            b[i] -= factor * b[k]
+    for k in range(2, -1, -1):
+        for j in range(k + 1, 3):
+            b[k] -= A[k, j] * b[j]
+        b[k] /= A[k, k]
+        if not np.isfinite(b[k]):
+            raise np.linalg.LinAlgError("the turning of a body is not finite")
 
 
 @njit(cache=True, error_model="numpy")
@@ -273,7 +325,7 @@ def turned(orientation, angle):
     """Quaternions (b, 4) times those of rotations by angle (b, 3), in own axes."""
     out = np.empty_like(orientation)
     for b in range(len(orientation)):
-        size = np.sqrt((angle[b] * angle[b]).sum())
+        size = np.sqrt(angle[b, 0] ** 2 + angle[b, 1] ** 2 + angle[b, 2] ** 2)
         half = 0.5 * size
         factor = np.sin(half) / size if size > 1e-8 else 0.5 - size * size / 48
         w, x, y, z = orientation[b]
@@ -283,11 +335,11 @@ def turned(orientation, angle):
             factor * angle[b, 1],
             factor * angle[b, 2],
         )
-        q = np.array([
-            w * c - x * i - y * j - z * k, w * i + x * c + y * k - z * j,
-            w * j - x * k + y * c + z * i, w * k + x * j - y * i + z * c,
-        ])  # fmt: skip
-        out[b] = q / np.sqrt((q * q).sum())
+        q0, q1 = w * c - x * i - y * j - z * k, w * i + x * c + y * k - z * j
+        q2, q3 = w * j - x * k + y * c + z * i, w * k + x * j - y * i + z * c
+        length = np.sqrt(q0 * q0 + q1 * q1 + q2 * q2 + q3 * q3)
+        out[b, 0], out[b, 1] = q0 / length, q1 / length
+        out[b, 2], out[b, 3] = q2 / length, q3 / length
     return out
 
 
@@ -318,7 +370,14 @@ def levers_of(slave, master, axes, arms, master_arms, masses, inverse):  # noqa:
     n, bodies = len(slave), len(masses)
     levers, C = np.zeros((n, 2, 3, 6)), np.zeros((bodies, 3, 3))
     for b in range(bodies):
-        C[b] = np.linalg.cholesky(inverse[b])
+        for d in range(3):
+            for e in range(d + 1):
+                left = inverse[b, d, e]
+                for k in range(e):
+                    left -= C[b, d, k] * C[b, e, k]
+                if d == e and not left > 0.0:
+                    raise np.linalg.LinAlgError("the inertia of a body is not definite")
+                C[b, d, e] = np.sqrt(left) if d == e else left / C[b, e, e]
     for i in range(n):
         for p in range(2):
             b, arm = (slave[i], arms[i]) if p == 0 else (master[i], master_arms[i])
@@ -328,7 +387,7 @@ def levers_of(slave, master, axes, arms, master_arms, masses, inverse):  # noqa:
             light = sign / np.sqrt(masses[b])
             for k in range(3):
                 a, row = axes[i, k], levers[i, p, k]
-                turning = np.cross(arm, a)
+                turning = _cross(arm, a)
                 for d in range(3):
                     row[d] = light * a[d]
                     for e in range(d, 3):  # C is lower triangular

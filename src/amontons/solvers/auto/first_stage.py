@@ -18,6 +18,7 @@ from numpy.typing import NDArray
 
 from ...core.arrays import read_only
 from ...core.compiled import njit
+from ...core.copies import copy_rows_inplace
 from ...problem.friction import FrictionProblem
 from ...problem.judge.contacts import assess
 from ...problem.judge.measures import natural_error
@@ -115,7 +116,8 @@ def solve_range(  # noqa: PLR0913
                 if not changed or not error <= goal:
                     break
                 told[p, CHANGED] = 1.0
-                x[:] = after[:] = kept[a:b]
+                copy_rows_inplace(kept[a:b], x)
+                copy_rows_inplace(x, after)
             if not worst > weakest[p] or left <= 0 or error == 0.0:
                 break
             goal = min(error * TIGHTER * weakest[p] / worst, TIGHTER * goal)

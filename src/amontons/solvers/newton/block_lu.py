@@ -15,6 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...core.compiled import njit
+from ...core.copies import copy_inplace
 from ...linear.blocks import BlockRows
 from ...problem.friction import FrictionProblem
 
@@ -143,7 +144,7 @@ def _minimum_degree(indptr, indices):
                 word ^= low
         while filled + count > len(later):
             bigger = np.empty(2 * len(later), dtype=np.int32)
-            bigger[:filled] = later[:filled]
+            copy_inplace(later, bigger[:filled])
             later = bigger
         pivot_word, pivot_bit = pivot >> 6, one << np.uint64(pivot & 63)
         for a in range(count):

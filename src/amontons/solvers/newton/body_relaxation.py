@@ -136,7 +136,9 @@ def _assemble(levers, sides, inverse, indptr, indices, data):
     """1 + G^T E^-1 G into blocks (., 3, 3)."""
     data[:] = 0.0
     for b in range(len(indptr) - 1):
-        data[_found(indptr, indices, b, b)] = np.eye(3)
+        place = _found(indptr, indices, b, b)
+        for a in range(3):
+            data[place, a, a] = 1.0
     product = np.empty((3, 6))
     for i in range(len(sides)):
         F = inverse[i]

@@ -34,6 +34,7 @@ from numpy.typing import NDArray
 
 from ...core.clock import NEVER, Deadline
 from ...core.compiled import njit
+from ...core.copies import copy_rows_inplace
 from ...core.errors import InvalidInput, UnsupportedLaw
 from ...core.options import check_options
 from ...linear.blocks import spatial
@@ -187,7 +188,7 @@ def newton_inplace(  # noqa: PLR0913
     inverse, work = np.empty((nc, 3, 3)), np.zeros((nc, 3, 3))
     rhs, dr, du = np.empty((nc, 3)), np.empty((nc, 3)), np.empty((nc, 3))
     u, trial, trial_u = np.empty((nc, 3)), np.empty((nc, 3)), np.empty((nc, 3))
-    r[:, :] = x
+    copy_rows_inplace(x, r)
     _product(indptr, indices, data, prox, x, u)
     for i in range(nc):
         for a in range(3):
@@ -225,12 +226,12 @@ def newton_inplace(  # noqa: PLR0913
             step *= 0.5
         if not math.isfinite(value):
             return -count, best, sigma
-        x[:, :] = trial
-        u[:, :] = trial_u
+        copy_rows_inplace(trial, x)
+        copy_rows_inplace(trial_u, u)
         residual = _law_error(x, u, kind, parameters, rho)
         if residual < best:
             best = residual
-            r[:, :] = x
+            copy_rows_inplace(x, r)
         if best <= 0.5 * milestone:
             milestone, last_gain = best, count
         recent[count % 4] = value

@@ -31,6 +31,7 @@ from numba import uint64
 from numpy.typing import NDArray
 
 from ...core.compiled import njit
+from ...core.copies import copy_inplace, copy_rows_inplace
 from ...linear.block_kernels import full_product
 from ...problem.equations import JUDGE_FLOPS
 from ...problem.friction import FrictionProblem
@@ -240,7 +241,7 @@ def sweeps_until_inplace(s, r, before, sweeps, tau):
     """
     change = math.inf
     for k in range(sweeps):
-        before[:, :] = r
+        copy_rows_inplace(r, before)
         sweep_inplace(s, False, r)
         moved = size = 0.0
         for i in range(len(r)):
@@ -306,9 +307,9 @@ def anderson_inplace(s, r, x, history, gram, count, sweeps, watch):  # noqa: PLR
     last one ended.  The history is dropped when the residual doubles; `watch` as above.
     """
     for k in range(sweeps):
-        r[:, :] = x
+        copy_rows_inplace(x, r)
         if content(s, r, sweep_inplace(s, False, r), watch):
-            x[:, :] = r
+            copy_rows_inplace(r, x)
             return k + 1
         mix_inplace(r, x, history, gram, count)
     return sweeps
@@ -347,8 +348,8 @@ def mix_inplace(r, x, history, gram, count):
         gram[slot, slot] = _dot(slope, slope)
     count[1] = 1
     filled = min(count[0], depth)
-    image[:] = g
-    xf[:] = g
+    copy_inplace(g, image)
+    copy_inplace(g, xf)
     if filled > 0 and _least_squares(gram, target, filled, factor, weights):
         for a in range(filled):
             w, step = weights[a], steps[a]

@@ -19,6 +19,7 @@ from typing import ClassVar
 import numpy as np
 
 from ...core.compiled import njit
+from ...core.copies import copy_inplace
 from ...core.options import check_options
 from ...problem.law.rolling import all_missed, missed_inplace, projected_inplace, sizes_of
 from ...problem.law.rolling import velocities_inplace as moved_inplace
@@ -187,10 +188,10 @@ def solve_rolling(A, b, a, rho, r):
         return
     other = start.copy()
     if after < before:
-        other[:] = r
+        copy_inplace(r, other)
     _by_projections(A, b, a, rho, other)
     if not after <= _missed(A, b, a, rho, other, u, z, e):
-        r[:] = other
+        copy_inplace(other, r)
 
 
 @njit(cache=True, error_model="numpy")
@@ -224,7 +225,7 @@ def rolling_sweeps_inplace(indptr, indices, data, q, coefficients, rho, diagonal
                     for k in range(6):
                         for c in range(6):
                             b[k] += data[place, k, c] * r[j, c]
-            own[:] = r[i]
+            copy_inplace(r[i], own)
             solve_rolling(data[diagonal[i]], b, coefficients[i], rho[i], own)
             for k in range(6):
                 change += ((own[k] - r[i, k]) / rho[i]) ** 2
