@@ -22,7 +22,8 @@ LIMITS = {  # runs from which a program's limit is taken: both meshes, load step
         (THIRD, f"{THIRD}, half steps", f"{THIRD}, fine, half steps"),
     ),
 }  # fmt: skip
-WHOLE = ("folded strip",)  # let go in the second half: the whole path is compared
+# let go in the second half: the whole path is compared
+WHOLE = ("folded strip", "folded strip, round tip")
 
 
 def columns(case):
