@@ -65,8 +65,12 @@ MORE_RUNS = {  # where two programs differ: finer in mesh, load step and stiffne
         f"{THIRD}, fine, half steps",
     ),
     "folded strip": (
-        "amontons, fine, half steps", THIRD, f"{THIRD}, fine", f"{THIRD}, fine, half steps",
-        f"{THIRD}, fine, x 3", f"{THIRD}, finer",
+        "amontons, fine, half steps", "GetFEM, finer", THIRD, f"{THIRD}, half steps",
+        f"{THIRD}, x 3", f"{THIRD}, fine",
+    ),
+    "folded strip, round tip": (
+        "amontons, fine, half steps", "amontons, finer", "GetFEM, finer", THIRD,
+        f"{THIRD}, half steps", f"{THIRD}, fine",
     ),
     "pressed into a tube": (
         "amontons, fine, exchanged", "amontons, exchanged, half steps", "GetFEM, exchanged",

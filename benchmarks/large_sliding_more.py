@@ -9,6 +9,7 @@ import numpy as np
 
 import amontons as am
 from amontons.mechanics.meshes import Facets
+from amontons.mechanics.meshes.order import second_order
 
 POISSON = 0.3
 
@@ -27,12 +28,11 @@ class Driven:
     steps: int
     sides: tuple[str, str]
     mu: float
-    order: int = 1
     poisson: float = POISSON
 
     def model(self, swap=False, law=am.NeoHookean):
         """The model; with swap the other side is the slave; law(young, poisson)."""
-        bodies = [am.Body(mesh, law(young, POISSON), name=name, order=self.order)
+        bodies = [am.Body(mesh, law(young, POISSON), name=name)
                   for name, (mesh, young) in self.bodies.items()]  # fmt: skip
         dim = bodies[0].mesh.dim
 
@@ -97,14 +97,20 @@ def turned(order=1, fine=1):
         out[:, 2] = -0.05 * min(step / 4, 1)
         return out
 
+    if order == 2:
+        below, above = second_order(below), second_order(above)
     bodies = {"below": (below, 1.0), "above": (above, 4.0)}
     return Driven(bodies, (am.Fix("below.bottom", 0),), "above.top", way, 76,
-                  ("above.bottom", "below.top"), 0.2, order)  # fmt: skip
+                  ("above.bottom", "below.top"), 0.2)  # fmt: skip
 
 
 # ------------------------------------------------------------------------------- folding
-def folded(fine=1):
-    """A strip bent to a U: its arms are pressed together, one is pulled along the other."""
+def folded(fine=1, recede=0.0):
+    """A strip bent to a U: its arms are pressed together, one is pulled along the other.
+
+    recede: by how much the inside of the upper arm's end is bent away, on a circle that begins
+    0.2 before the end.  Without it a sharp corner slides, which wrinkles on fine meshes.
+    """
     arm, gap, thick = 2.0, 0.3, 0.2
     radius = (gap + thick) / 2
     half = np.pi * radius
@@ -115,6 +121,10 @@ def folded(fine=1):
     centre = np.stack([np.minimum(s, arm) - past + radius * np.cos(angle),
                        radius * np.sin(angle)], axis=1)  # fmt: skip
     inward = -np.stack([np.cos(angle), np.sin(angle)], axis=1)
+    if recede:
+        round_ = (recede**2 + 0.2**2) / (2 * recede)
+        end = np.maximum(s - (2 * arm + half - 0.2), 0)
+        h = h * (1 - (round_ - np.sqrt(round_**2 - end**2)) / thick)
     mesh = replace(mesh, points=centre + (h - thick / 2)[:, None] * inward)
     (inside,), (outside,) = mesh.surface("top"), mesh.surface("bottom")
     first, second = (mesh.points[f.nodes].mean(axis=1) for f in (inside, outside))
@@ -174,5 +184,6 @@ MORE = {
     "turned by 360 degrees": turned,
     "turned, second order": lambda: turned(order=2),
     "folded strip": folded,
+    "folded strip, round tip": lambda fine=1: folded(fine, recede=0.1),
     "pressed into a tube": pressed_in,
 }

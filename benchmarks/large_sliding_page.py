@@ -21,8 +21,13 @@ LIMITS = {  # runs from which a program's limit is taken: both meshes, load step
         ("GetFEM", "GetFEM, x 10", "GetFEM, fine, x 10"),
         (THIRD, f"{THIRD}, half steps", f"{THIRD}, fine, half steps"),
     ),
+    "folded strip, round tip": (
+        ("amontons", "amontons", "amontons, fine"), ("GetFEM", "GetFEM", "GetFEM, fine"),
+        (THIRD, THIRD, f"{THIRD}, fine"),
+    ),
 }  # fmt: skip
-WHOLE = ("folded strip",)  # let go in the second half: the whole path is compared
+# let go in the second half: the whole path is compared
+WHOLE = ("folded strip", "folded strip, round tip")
 
 
 def columns(case):

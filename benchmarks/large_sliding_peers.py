@@ -121,7 +121,7 @@ def _sizes(facets):
     """Lengths, or square roots of areas, of facets (f, a, d)."""
     if facets.shape[2] == 2:
         return np.linalg.norm(facets[:, 1] - facets[:, 0], axis=1)
-    one, two = facets[:, 2] - facets[:, 0], facets[:, -1] - facets[:, 1]
+    one, two = facets[:, 2] - facets[:, 0], facets[:, 3] - facets[:, 1]
     return np.sqrt(np.linalg.norm(np.cross(one, two), axis=1) / 2)
 
 

@@ -8,11 +8,13 @@ and a penalty at `POINTS` points of every slave facet against the closest master
 a spring along it that is anchored in the master where the point touched, and whose anchor is
 drawn along when Coulomb's limit is reached (the "moving friction cone" of P. Wriggers,
 L. Krstulovic-Opara, Int. J. Comput. Methods 1 (2004) 105-119).  For a point x, its projection
-y on a facet with normal n and tangent t, and its anchor a,
+y on a facet along the normal n there, its tangent t, and its anchor a,
 
     g = n . (x - y),  p = e max(-g, 0),   T = e_t t . (a - x), cut to |T| <= mu p,
 
-forces p n + T t act on x and the opposite at y.  All tangents are complex differences.  The
+forces p n + T t act on x and the opposite at y.  Normals are means at nodes and linear between
+them: with those of single facets forces jump from one to the next, and where a corner slides
+no equilibrium may be left.  All tangents are complex differences.  The
 penalties e = e_t are `STIFF` times the softer modulus over a facet's length, so that what
 they give way vanishes with the mesh.  Bodies of rotation are given by their meridian:
 coordinates r and z, F_33 = r / R.
@@ -20,6 +22,7 @@ coordinates r and z, F_33 = r / R.
 
 import time
 from dataclasses import dataclass, replace
+from functools import cached_property
 from itertools import pairwise
 
 import numpy as np
@@ -36,6 +39,7 @@ PARTS = (1, 4, 16)  # of a load step, one number after another
 RAMP, MOST = (0.03, 0.1, 0.3, 1.0), 12  # parts of the penalty, Newton steps at each
 TINY = 1e-30  # step of complex differences
 NEAR = 0.4  # lengths beyond which nothing is seen
+SLACK = 1e-9  # beyond ends of facets
 GAUSS = 1 / np.sqrt(3)
 
 
@@ -98,6 +102,37 @@ def differences(force, u):
     return force(u), np.stack(slopes, axis=2)
 
 
+def turned(normals):
+    """Tangents (..., 2) of a facet from its start to its end, for outward normals."""
+    return np.stack([-normals[..., 1], normals[..., 0]], axis=-1)
+
+
+@np.errstate(all="ignore")  # points far off that face nothing: not finite
+def across(at, facet, before, after):
+    """Part of a facet that points face along its normals, vector from there, unit normal.
+
+    at (..., 2); facet and those beside it (..., 2 nodes, 2), real or complex.  Normals are
+    those at its ends, mean ones of the facets that meet there, and linear in between: with
+    s the part, y = x_1 + s e, (x - y) . (t_1 + s (t_2 - t_1)) = 0.
+    """
+    edge = facet[..., 1, :] - facet[..., 0, :]
+    own = unit(edge)
+    first, second = (own + unit(side[..., 1, :] - side[..., 0, :]) for side in (before, after))
+    first, second = unit(first), unit(second)
+    bent, start = second - first, at - facet[..., 0, :]
+    a, b = -(edge * bent).sum(-1), (start * bent).sum(-1) - (edge * first).sum(-1)
+    c = (start * first).sum(-1)
+    part = 2 * c / (np.sqrt(b**2 - 4 * a * c) - b)
+    way = unit(first + part[..., None] * bent)
+    normal = np.stack([way[..., 1], -way[..., 0]], axis=-1)
+    return part, start - part[..., None] * edge, normal
+
+
+def unit(vectors):
+    """Vectors (..., 2), real or complex, over their lengths."""
+    return vectors / np.sqrt((vectors**2).sum(-1))[..., None]
+
+
 @dataclass
 class Sides:
     """Points of the slave's facets and the master's facets; what they remember.
@@ -134,52 +169,46 @@ class Sides:
         return cls(slaves, parts, weights, master, stiffness, mu,
                    np.zeros(k, dtype=np.int64), np.zeros(k), np.zeros(k))  # fmt: skip
 
+    @cached_property
+    def _around(self):
+        """Facets before and after every one, (s, 2), itself at an end."""
+        own, found = np.arange(len(self.master)), []
+        for one, other in ((0, 1), (1, 0)):
+            same = self.master[:, one][:, None] == self.master[:, other]
+            found.append(np.where(same.any(axis=1), same.argmax(axis=1), own))
+        return np.stack(found, axis=1)
+
+    def nodes(self, some, facet, anchor):
+        """Nodes (k, 10) that tell the force: slave, facet, those around it, anchor."""
+        around = self.master[self._around[facet]].reshape(-1, 4)
+        return np.concatenate([self.slave[some], self.master[facet], around,
+                               self.master[anchor]], axis=1)  # fmt: skip
+
     def closest(self, x):
         """Master facet (k,), part (k,) in 0..1 and gap (k,) of points; inf beyond an end."""
         at = x[self.slave]
         at = (1 - self.parts)[:, None] * at[:, 0] + self.parts[:, None] * at[:, 1]
-        start, end = x[self.master].swapaxes(0, 1)
-        edge = end - start
-        long2 = (edge**2).sum(axis=1)
-        away = at[:, None] - start
-        part = np.clip((away * edge).sum(axis=2) / long2, 0, 1)
-        apart = away - part[..., None] * edge
-        distance = np.linalg.norm(apart, axis=2)
-        best = distance.argmin(axis=1)
+        there = x[self.master], *x[self.master[self._around]].swapaxes(0, 1)
+        part, away, normal = across(at[:, None], *there)
+        gap = (away * normal).sum(axis=2)
+        seen = (part >= -SLACK) & (part <= 1 + SLACK) & (np.abs(gap) < NEAR)
+        best = np.where(seen, np.abs(gap), np.inf).argmin(axis=1)
         row = np.arange(len(at))
-        normal = np.stack([edge[:, 1], -edge[:, 0]], axis=1)[best]
-        normal /= np.linalg.norm(normal, axis=1)[:, None]
-        gap = (apart[row, best] * normal).sum(axis=1)
-        part = part[row, best]
-        off = (part <= 0) & self._first[best] | (part >= 1) & self._last[best]
-        return best, part, np.where((distance[row, best] > NEAR) | off, np.inf, gap)
-
-    @property
-    def _first(self):
-        """Facets whose start is an end of the side."""
-        return ~np.isin(self.master[:, 0], self.master[:, 1])
-
-    @property
-    def _last(self):
-        """Facets whose end is an end of the side."""
-        return ~np.isin(self.master[:, 1], self.master[:, 0])
+        gap = np.where(seen[row, best], gap[row, best], np.inf)
+        return best, np.clip(part[row, best], 0, 1), gap
 
     def forces(self, x, some, facet, anchor, anchored, slides):
-        """Forces (k, 8) on slave, and master nodes of `some` points at positions (k, 12).
+        """Forces (k, 8) on slave, and master nodes of `some` points, `nodes` at x (k, 20).
 
         slides (k,): sign of the friction on x where it slides, 0 where it sticks.
         """
-        x = x.reshape(len(x), 6, 2)
+        x = x.reshape(len(x), 10, 2)
         part = self.parts[some][:, None]
         at = (1 - part) * x[:, 0] + part * x[:, 1]
-        edge = x[:, 3] - x[:, 2]
-        long = np.sqrt((edge**2).sum(axis=1))[:, None]
-        t = edge / long
-        n = np.stack([t[:, 1], -t[:, 0]], axis=1)
-        away = at - x[:, 2]
-        there = (away * t).sum(axis=1)[:, None] / long
+        there, away, n = across(at, x[:, 2:4], x[:, 4:6], x[:, 6:8])
+        t, there = turned(n), there[:, None]
         pressure = -self.stiffness * (away * n).sum(axis=1)
-        held = (1 - anchored[:, None]) * x[:, 4] + anchored[:, None] * x[:, 5]
+        held = (1 - anchored[:, None]) * x[:, 8] + anchored[:, None] * x[:, 9]
         spring = self.stiffness * ((held - at) * t).sum(axis=1)
         along = np.where(slides == 0, spring, slides * self.mu * pressure)
         force = (pressure[:, None] * n + along[:, None] * t) * self.weights[some][:, None]
@@ -197,8 +226,8 @@ class Sides:
         now = x[self.slave[some]]
         parts = self.parts[some][:, None]
         now = (1 - parts) * now[:, 0] + parts * now[:, 1]
-        edge = x[self.master[facet, 1]] - x[self.master[facet, 0]]
-        t = edge / np.linalg.norm(edge, axis=1)[:, None]
+        there = x[self.master[facet]], *x[self.master[self._around[facet]]].swapaxes(0, 1)
+        t = turned(across(now, *there)[2])
         spring = self.stiffness * ((held - now) * t).sum(axis=1)
         limit = -self.mu * self.stiffness * gap
         slides = np.where(np.abs(spring) > limit, np.sign(spring), 0.0)
@@ -355,9 +384,8 @@ def assembled(solids, sides, at, u):
     sides.before[:] = 0
     sides.before[some] = slides
     if len(some):
-        nodes = np.concatenate([sides.slave[some], sides.master[facet], sides.master[anchor]],
-                               axis=1)  # fmt: skip
-        dofs = (nodes[:, :, None] * 2 + np.arange(2)).reshape(len(some), 12)
+        nodes = sides.nodes(some, facet, anchor)
+        dofs = (nodes[:, :, None] * 2 + np.arange(2)).reshape(len(some), -1)
 
         def push(v):
             return -sides.forces(v, some, facet, anchor, anchored, slides)
