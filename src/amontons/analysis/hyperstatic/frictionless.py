@@ -2,8 +2,8 @@
 
     M v = f + H_N p,   s = H_N^T v + w_N >= 0,   p >= 0,   s_i p_i = 0                       (1)
 
-are the conditions of a convex quadratic program.  Bodies that nothing but friction would hold in
-some direction make M singular there, with all contacts: its solutions are a set that has no
+are the conditions of a convex quadratic program.  Bodies that nothing but friction would hold
+in some direction make M singular there, with all contacts: its solutions are a set that has no
 end, and methods that need one solution, or the right contacts, wander.  A predictor-corrector
 step [M] solves
 
@@ -13,8 +13,8 @@ r_d and r_p what (1) leaves, c the change of s p that is wanted: one sparse, def
 which needs the e only where neither bodies nor contacts resist.  As r_d is taken from the
 iterate itself, e slows steps down and does not change what they tend to.
 
-[M] S. Mehrotra, "On the implementation of a primal-dual interior point method", SIAM J. Optim. 2
-(1992) 575-601.
+[M] S. Mehrotra, "On the implementation of a primal-dual interior point method", SIAM J. Optim.
+2 (1992) 575-601.
 """
 
 from __future__ import annotations

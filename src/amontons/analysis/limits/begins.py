@@ -201,9 +201,7 @@ class _Found:
 
 
 # -------------------------------------------------------------------------- from above
-def _mechanisms(
-    blocks: Assembly, first: Array, deadline: Deadline
-) -> Iterator[Array]:
+def _mechanisms(blocks: Assembly, first: Array, deadline: Deadline) -> Iterator[Array]:
     """The motions of the sequences of programs."""
     for kept in KEPT:
         yield from _sequence(blocks, first[:, 0], kept, deadline)
