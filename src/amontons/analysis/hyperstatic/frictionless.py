@@ -84,7 +84,7 @@ class _Program:
     H: sparse.csc_array
     f: Array
     w: Array
-    held: sparse.dia_array
+    held: Array
 
     @classmethod
     def of(cls, problem: FrictionProblem) -> _Program:
@@ -93,8 +93,7 @@ class _Program:
         assert whole.f is not None and whole.w is not None
         M, H = sparse.csc_array(whole.M), sparse.csc_array(whole.H)
         diagonal = M.diagonal()
-        least = float(diagonal.max(initial=0.0))
-        held = sparse.diags_array(HELD * np.where(diagonal > 0, diagonal, least))
+        held = HELD * np.where(diagonal > 0, diagonal, float(diagonal.max(initial=0.0)))
         return cls(M, H[:, :: whole.dimension], whole.f, whole.w[:, 0], held)
 
     @property
@@ -119,11 +118,12 @@ class _Program:
 
     def _stiffness(self) -> Array:
         """Of the bodies at every contact, by the diagonal of M, (nc,)."""
-        soft = (self.H.power(2)).T @ (HELD / self.held.diagonal())
+        soft = self.H.power(2).T @ (HELD / self.held)
         return 1.0 / np.where(soft > 0, soft, float(soft.max(initial=0.0)) or 1.0)
 
     def _factor(self, D: Array) -> Any:
-        whole = self.M + self.H @ sparse.diags_array(D) @ self.H.T + self.held
+        whole = self.M + self.H @ sparse.diags_array(D) @ self.H.T
+        whole = whole + sparse.diags_array(self.held)
         return Direct().factor(sparse.csc_array(whole)).solve
 
     def is_solved(self, at: _Iterate) -> bool:

@@ -102,7 +102,7 @@ class Relaxation:
     def _wide(self, rows: Array) -> sparse.csr_array:
         """Rows in w as rows in all columns of V."""
         nothing = sparse.csr_array((len(rows), self.columns - self.n))
-        return sparse.hstack([sparse.csr_array(rows), nothing], format="csr")
+        return sparse.csr_array(sparse.hstack([sparse.csr_array(rows), nothing]))
 
     @property
     def unknowns(self) -> int:
