@@ -32,7 +32,7 @@ class Branching:
     def __init__(self, relaxed: Relaxation, most: float, deadline: Deadline) -> None:
         self.relaxed, self.most, self.deadline = relaxed, most, deadline
         self.nodes: list[Node] = []
-        self.settled = np.inf  # least bound of those that nothing is left to decide of
+        self.settled = np.inf  # least bound of programs that are not on the list any more
         self.lower = self.residual = 0.0
         self.programs = 0
 
@@ -77,7 +77,8 @@ class Branching:
         self.residual = max(self.residual, answer.residual)
         value = max(least, answer.value)  # what failed is no worse than what it came from
         if answer.motion is None and answer.value > 0:
-            return  # nothing below `most`
+            self.settled = min(self.settled, value)  # nothing below `most`, as far as proved
+            return
         heapq.heappush(self.nodes, (value, self.programs, decided, answer))
         if answer.motion is not None:
             yield answer.motion
