@@ -1,10 +1,11 @@
 """Lists of all solutions and verdicts on uniqueness against exact arithmetic.
 
     python benchmarks/exact_lists.py [--plane 5000] [--space 300] [--seed 1] [--output FOLDER]
-                                     [--kept FILE] [--at-most SECONDS]
+                                     [--kept FILE] [--at-most SECONDS] [--skewed]
 
-With --kept what was done is written to a file now and then, and a later run goes on from
-there; --at-most ends a run after so many CPU seconds, and the page says how far it came.
+With --kept what was done is written to a file after every problem, and a later run goes on
+from there; --at-most ends a run after so many CPU seconds, and the page says how far it came.
+With --skewed W is unsymmetric in every family, and the page is exact_lists_skewed.md.
 
 Random problems with loads that cancel, W that is nearly singular, contacts of very different
 size, and what else makes solutions hard to tell apart.  The truth comes from rational numbers
@@ -36,9 +37,9 @@ from amontons.analysis.solutions.discs.known import NEAR
 Array = NDArray[np.float64]
 Generator = np.random.Generator
 LIMIT = 10.0  # seconds for one question
-EVERY = 50  # problems after which what is done is written
 ROUNDING = 1e-13  # smallest eigenvalue of W, relative, below which a set is one by rounding
 Case = tuple[Array, Array, Array]  # W, q, mu
+Definite = Callable[[Generator, int], Array]  # a W of so many rows
 NOTE = """\
 {plane} problems in 2D (up to five contacts) and {space} in 3D (up to two), seed {seed}.
 False: a verdict that exact arithmetic refutes, or an entry that is said to be exactly one
@@ -56,29 +57,36 @@ def _spd(random: Generator, m: int, least: float = 0.05) -> Array:
     return A @ A.T / m + least * np.eye(m)
 
 
+def _skewed(random: Generator, m: int) -> Array:
+    """A definite matrix with a skew part, from little to as large as the rest."""
+    skew = random.standard_normal((m, m))
+    return _spd(random, m) + random.uniform(0, 1) / np.sqrt(m) * (skew - skew.T)
+
+
 def _friction(random: Generator, nc: int) -> Array:
     mu = random.uniform(0.1, 3.0, nc) * 10.0 ** random.uniform(-0.5, 0.5)
     mu[random.random(nc) < 0.05] = 0.0
     return mu
 
 
-def plain(random: Generator, nc: int, d: int) -> Case:
+def plain(random: Generator, nc: int, d: int, definite: Definite = _spd) -> Case:
     """Nothing special but strong coupling."""
-    return _spd(random, nc * d), random.standard_normal((nc, d)), _friction(random, nc)
+    return definite(random, nc * d), random.standard_normal((nc, d)), _friction(random, nc)
 
 
-def several(random: Generator, nc: int, d: int) -> Case:
+def several(random: Generator, nc: int, d: int, definite: Definite = _spd) -> Case:
     """Contacts that have three solutions each, weakly coupled."""
     one = np.eye(d)
     one[0, 1] = one[1, 0] = 0.8
-    W = np.kron(np.eye(nc), one) + 0.02 * _spd(random, nc * d)
+    W = np.kron(np.eye(nc), one) + 0.02 * definite(random, nc * d)
     q = np.abs(random.standard_normal((nc, d)))
     return W, q, random.uniform(1.0, 4.0, nc)
 
 
-def cancelling(random: Generator, nc: int, d: int) -> Case:
+def cancelling(random: Generator, nc: int, d: int, definite: Definite = _spd) -> Case:
     """The load of the last contact is the small rest of large terms."""
-    W, q, mu = several(random, nc, d) if random.random() < 0.7 else plain(random, nc, d)
+    family = several if random.random() < 0.7 else plain
+    W, q, mu = family(random, nc, d, definite)
     if nc == 1:
         return W, q, mu
     mix = random.standard_normal((d, (nc - 1) * d)) * 0.5
@@ -94,35 +102,39 @@ def cancelling(random: Generator, nc: int, d: int) -> Case:
     return W, small * rest - (W @ pressed.ravel()).reshape(nc, d), mu
 
 
-def nearly_singular(random: Generator, nc: int, d: int) -> Case:
+def nearly_singular(random: Generator, nc: int, d: int, definite: Definite = _spd) -> Case:
     """Some tiny eigenvalues."""
     m = nc * d
     Q = np.linalg.qr(random.standard_normal((m, m)))[0]
     values = random.uniform(0.05, 2.0, m)
     values[: random.integers(1, max(2, m // 2) + 1)] = 10.0 ** random.uniform(-13, -3)
     W = Q @ np.diag(values) @ Q.T
-    return (W + W.T) / 2, random.standard_normal((nc, d)), _friction(random, nc)
+    W = (W + W.T) / 2
+    if definite is not _spd:
+        more = definite(random, m)
+        W = W + (more - more.T) / 2
+    return W, random.standard_normal((nc, d)), _friction(random, nc)
 
 
-def mixed_scales(random: Generator, nc: int, d: int) -> Case:
+def mixed_scales(random: Generator, nc: int, d: int, definite: Definite = _spd) -> Case:
     """Each contact in units of its own, loads far apart."""
-    W, q, mu = (several, plain, cancelling)[random.integers(3)](random, nc, d)
+    W, q, mu = (several, plain, cancelling)[random.integers(3)](random, nc, d, definite)
     scale = 10.0 ** random.uniform(-9, 9, nc)
     each = np.repeat(scale, d)
     load = 10.0 ** random.uniform(-5, 0, (nc, 1)) if random.random() < 0.5 else 1.0
     return W * each * each[:, None], q * scale[:, None] * load, mu
 
 
-def not_symmetric(random: Generator, nc: int, d: int) -> Case:
-    """A definite W with a skew part."""
-    W, q, mu = plain(random, nc, d)
+def not_symmetric(random: Generator, nc: int, d: int, definite: Definite = _spd) -> Case:
+    """A definite W with a skew part that is larger than the rest."""
+    W, q, mu = plain(random, nc, d, definite)
     skew = random.standard_normal(W.shape)
     return W + random.uniform(0, 1) * (skew - skew.T), q, mu
 
 
-def near_border(random: Generator, nc: int, d: int) -> Case:
+def near_border(random: Generator, nc: int, d: int, definite: Definite = _spd) -> Case:
     """A solution next to a border of the law, or on it."""
-    W, _, mu = several(random, nc, d) if random.random() < 0.5 else plain(random, nc, d)
+    W, _, mu = (several if random.random() < 0.5 else plain)(random, nc, d, definite)
     r, u = np.zeros((2, nc, d))
     for i in range(nc):
         kind = random.integers(4)
@@ -136,20 +148,20 @@ def near_border(random: Generator, nc: int, d: int) -> Case:
     return W, q + 10.0 ** random.uniform(-16, -6) * random.standard_normal((nc, d)), mu
 
 
-FAMILIES: dict[str, Callable[[Generator, int, int], Case]] = {
+FAMILIES: dict[str, Callable[[Generator, int, int, Definite], Case]] = {
     "plain": plain, "several": several, "cancelling": cancelling,
     "nearly singular": nearly_singular, "mixed scales": mixed_scales,
     "not symmetric": not_symmetric, "near a border": near_border,
 }  # fmt: skip
 
 
-def draw(number: int, seed: int, d: int) -> tuple[str, Case]:
+def draw(number: int, seed: int, d: int, definite: Definite = _spd) -> tuple[str, Case]:
     """Problem `number`: its family, and W, q, mu."""
     random = np.random.default_rng([seed, d, number])
     names = list(FAMILIES)
     name = names[number % len(names)]
     nc = int(random.integers(1, 6 if d == 2 else 3))
-    case = FAMILIES[name](random, nc, d)
+    case = FAMILIES[name](random, nc, d, definite)
     return name, case if number // len(names) % 2 else turned(random, case)
 
 
@@ -277,11 +289,10 @@ def run(count: int, seed: int, d: int, kept: Kept) -> dict[str, Tally]:
     tallies = kept.tallies[d]
     while kept.done[d] < count and not kept.is_over:
         number = kept.done[d]
-        name, case = draw(number, seed, d)
+        name, case = draw(number, seed, d, _skewed if kept.skewed else _spd)
         compare(case, tallies[name], f"{d}D {number}")
         kept.done[d] += 1
-        if kept.done[d] % EVERY == 0 or kept.done[d] == count:
-            kept.write()
+        kept.write()
     return tallies
 
 
@@ -292,6 +303,7 @@ class Kept:
     seed: int
     path: Path | None = None
     at_most: float = float("inf")
+    skewed: bool = False
     done: dict[int, int] = field(default_factory=lambda: {2: 0, 3: 0})
     tallies: dict[int, dict[str, Tally]] = field(
         default_factory=lambda: {d: {name: Tally() for name in FAMILIES} for d in (2, 3)}
@@ -307,8 +319,11 @@ class Kept:
         if self.path is not None:
             tallies = {str(d): {name: vars(t) for name, t in of.items()}
                        for d, of in self.tallies.items()}  # fmt: skip
-            text = json.dumps({"seed": self.seed, "done": self.done, "tallies": tallies})
-            self.path.write_text(text)
+            text = json.dumps({"seed": self.seed, "skewed": self.skewed, "done": self.done,
+                               "tallies": tallies})  # fmt: skip
+            new = self.path.with_suffix(".new")
+            new.write_text(text)
+            new.replace(self.path)  # whole, whenever a run is ended
 
     def read(self) -> None:
         """What an earlier run of the same seed left."""
@@ -317,6 +332,8 @@ class Kept:
         found = json.loads(self.path.read_text())
         if found["seed"] != self.seed:
             raise SystemExit(f"{self.path}: of seed {found['seed']}, not {self.seed}")
+        if found.get("skewed", False) != self.skewed:
+            raise SystemExit(f"{self.path}: of another kind, with --skewed or without")
         self.done = {int(d): n for d, n in found["done"].items()}
         for d, of in found["tallies"].items():
             for name, values in of.items():
@@ -347,13 +364,17 @@ def main() -> None:
     parser.add_argument("--output", type=Path, default=Path(__file__).parent / "results")
     parser.add_argument("--kept", type=Path)
     parser.add_argument("--at-most", type=float, default=float("inf"))
+    parser.add_argument("--skewed", action="store_true")
     options = parser.parse_args()
-    kept = Kept(options.seed, options.kept, options.at_most)
+    kept = Kept(options.seed, options.kept, options.at_most, options.skewed)
     kept.read()
     info = describe()
-    lines = ["# Lists and verdicts against exact arithmetic", "",
+    skewed = " --skewed" * kept.skewed
+    name = "exact_lists_skewed.md" if kept.skewed else "exact_lists.md"
+    kind = ", W unsymmetric" * kept.skewed
+    lines = [f"# Lists and verdicts against exact arithmetic{kind}", "",
              f"`python benchmarks/exact_lists.py --plane {options.plane} --space "
-             f"{options.space} --seed {options.seed}`, {info['cores']} cores, Python "
+             f"{options.space} --seed {options.seed}{skewed}`, {info['cores']} cores, Python "
              f"{info['python']}, numpy {info['numpy']}.", "",
              NOTE.format(**vars(options))]  # fmt: skip
     for title, count, d in (("2D", options.plane, 2), ("3D", options.space, 3)):
@@ -365,7 +386,7 @@ def main() -> None:
         for tally in tallies.values():
             print(*tally.faults, sep="\n", end="\n" if tally.faults else "")
     kept.write()
-    (options.output / "exact_lists.md").write_text("\n".join(lines))
+    (options.output / name).write_text("\n".join(lines))
 
 
 if __name__ == "__main__":

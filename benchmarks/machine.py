@@ -21,6 +21,14 @@ def describe() -> dict[str, str]:
     return {"cpu": cpu, "cores": cores, "python": platform.python_version(), **versions}
 
 
+def with_kept(rows: list[str], names: Iterable[str], page: Path) -> list[str]:
+    """Rows of all names in their order, those that were not made again from the page."""
+    known = page.read_text(encoding="utf-8").splitlines() if page.exists() else []
+    made = {line.split("|")[1].strip(): line for line in known if line.startswith("| ")}
+    made |= {row.split("|")[1].strip(): row for row in rows}
+    return [made.get(name, f"| {name} | not run |") for name in names]
+
+
 def printed(row: Callable[[str], str], cases: Iterable[str]) -> list[str]:
     """The rows of a table, one for each case, each printed as soon as it is there."""
     rows = []

@@ -90,6 +90,20 @@ class Scaled:
         return (r.reshape(len(r), -1) @ self.W.T).reshape(r.shape) + self.q
 
     # ---------------------------------------------------------------- how loads compare
+    def largest(self, *known: Array) -> float:
+        """The largest sqrt|W_ii| |r_i| of reactions (nc, d), or |q_i| / sqrt|W_ii| of the load.
+
+        By |W_ii| itself, not by the power of two next to it: both scales would be off by it.
+        """
+        root = np.sqrt(self.size)[:, None]
+        sizes = [float(np.linalg.norm(root * r, axis=1).max(initial=0.0)) for r in known]
+        return max([*sizes, load_size(self.q / root, self.mu, self.reacts)]) or 1.0
+
+    def relative(self, off: Array | float, *known: Array) -> float:
+        """A bound of how far scaled reactions are off, each or (nc, d), over `largest`."""
+        root = np.sqrt(self.size)[:, None]
+        return float((root * off).max(initial=0.0)) / self.largest(*known)
+
     def load_shares(self, r: Array) -> tuple[Array, Array]:
         """(load of every contact, its terms without their signs), (nc,) each, at r scaled.
 
@@ -104,8 +118,7 @@ class Scaled:
         others = others.reshape(nc * d, nc * d)
         load = np.linalg.norm(self.q + (others @ r.ravel()).reshape(nc, d), axis=1)
         terms = np.abs(self.q) + (np.abs(others) @ np.abs(r).ravel()).reshape(nc, d)
-        largest = np.linalg.norm(root[:, None] * r, axis=1).max(initial=0.0)
-        largest = max(largest, load_size(self.q / root[:, None], self.mu, self.reacts)) or 1.0
+        largest = self.largest(r)
         counts = self.reacts & terms.any(axis=1)
         share = np.where(counts, load / root / largest, np.inf)
         return share, np.where(counts, np.linalg.norm(terms, axis=1) / root / largest, np.inf)

@@ -95,6 +95,19 @@ def test_units_change_nothing():
     assert [s.pattern for s in other.solutions] == [s.pattern for s in own.solutions]
 
 
+def test_what_a_list_resolves_is_told_in_no_units():
+    """Units are powers of two inside, up to 1.4 off for |W_ii|^1/2 and for the load each."""
+    W, r = np.array([[1.0, 0.8], [0.8, 1.0]]), np.array([[1.0, 0.5]])
+    q = -(W @ r.ravel()).reshape(1, 2)  # sticks, on the border of slip at mu = 1/2
+    found = {}
+    for a, b in itertools.product((1.0, 1.2, 1.4, 1.45, 1.7, 1.95), repeat=2):
+        problem = am.FrictionProblem.from_delassus(a * W, b * q, [0.5])
+        found[a, b] = am.all_solutions(problem)
+    assert all(one.complete for one in found.values())
+    told = np.array([one.resolution for one in found.values()])
+    assert told.max() <= 1.3 * told.min()  # rounding is a small part of DATA
+
+
 def test_one_contact_with_three_solutions():
     found = am.all_solutions(one_contact_2d(2.0))
     assert [(s.pattern, s.orientation) for s in found.solutions] == [

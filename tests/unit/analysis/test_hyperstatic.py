@@ -10,6 +10,7 @@ import amontons as am
 from amontons.analysis.certificates.verdict import Verdict
 from amontons.analysis.hyperstatic.ball import motion_bound
 from amontons.analysis.hyperstatic.face import centred, face_of, longest
+from amontons.analysis.hyperstatic.frictionless import without_friction
 from amontons.analysis.hyperstatic.held_tangents import held_tangents
 from amontons.analysis.hyperstatic.indeterminacy import indeterminacy
 from amontons.analysis.hyperstatic.motion import other_motion, rest
@@ -232,6 +233,23 @@ def test_a_ball_of_strains_where_contact_holds_the_bodies():
         energies.append(v @ (K @ v))
     at = energies[2]
     assert max(energies) <= bound.energy * at * (1 + 1e-6)
+
+
+def test_blocks_on_blocks_without_friction_press_and_lie_as_by_other_methods():
+    """Contact alone holds three of them; without friction nothing holds them sideways."""
+    stone = am.LinearElastic(10.0, 0.3, density=1.0)
+    made = am.Wall(2, 1, size=(2.0, 1.0), cells=(4, 2), material=stone)
+    problem, aside = (made.model([], [am.BodyForce((x, -1.0))]).assemble() for x in (0.0, 0.5))
+    assert problem.loose_modes.shape[1] >= 9
+    found = without_friction(problem, Deadline.after(20))
+    assert found.balance < 1e-10 and found.p.min() >= 0
+    u = problem.H.T[::2] @ found.v + problem.w[:, 0]
+    assert u.min() > -1e-8 * np.abs(u).max() and np.abs(u * found.p).max() < 1e-8
+    other = am.solve(problem.with_mu(0.0)).v
+    energy = [v @ (problem.M @ v) for v in (found.v, other)]
+    assert energy[0] == pytest.approx(energy[1], rel=1e-6)
+    pushed = without_friction(aside, Deadline.after(20))
+    assert pushed is None or pushed.balance > 1e-3  # nothing but friction would hold them
 
 
 def test_an_unsymmetric_matrix_gets_no_bounds_that_need_symmetry():

@@ -197,6 +197,21 @@ def test_walls_with_head_joints_are_bounded_closely(rows, blocks, mu):
     assert "A motion that the live load drives can begin at" in str(found)
 
 
+@pytest.mark.parametrize(("rows", "blocks", "load"), [(4, 1, 0.479262), (2, 2, 40 / 49)])
+def test_rough_walls_give_way_where_contacts_decided_one_by_one_say(rows, blocks, load):
+    """At friction 2 sequences of programs miss the least load, and one relaxation the proof.
+
+    The loads are those of the best states that the mixed-integer program of HiGHS finds, which
+    proves nothing of them in minutes.
+    """
+    problem, grows = running_bond(rows, blocks, 0.4, 0.175, 2.0)
+    found = am.collapse_load(problem, grows)
+    first = found.begins
+    assert first.width < 2e-3 and first.upper < 0.9 * found.upper
+    assert first.violation < 1e-9 and first.residual < 1e-9
+    assert first.upper == pytest.approx(load, rel=1e-5)
+
+
 def test_what_can_not_be_relaxed_in_time_still_has_a_witness():
     """Ferris and Tin-Loi's first wall: .64286 by limit analysis; real slip gives way before."""
     problem, grows = running_bond(6, 5, 0.4, 0.175, 0.65)

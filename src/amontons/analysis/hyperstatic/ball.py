@@ -29,11 +29,12 @@ from ...problem.friction import FrictionProblem
 from ...problem.solution import FrictionSolution
 from ...solvers.driver import drive
 from .face import rank_factor
+from .frictionless import without_friction
 
 Array = NDArray[np.float64]
 FITS = 1e-9  # part of q outside of the range of W that counts as rounding
 GAP = 1e-12  # negative gap or tangential w, relative to the velocities, that counts as none
-BALANCED = 1e-8  # error of the problem without friction that is good enough where M is singular
+BALANCED = 1e-8  # of the load, that pressures may leave where M is singular
 
 
 @dataclass(frozen=True, eq=False)
@@ -96,17 +97,17 @@ def ball_of(problem: FrictionProblem, deadline: Deadline) -> Ball | None:
         problem = in_energy
     if not has_plain_gaps(problem):
         return None
-    bare = drive(problem.with_mu(0.0), time_limit=deadline)
-    error = bare.convergence.error
-    if not np.isfinite(error):
-        return None
-    p = np.zeros_like(bare.r)
-    p[:, 0] = np.maximum(bare.r[:, 0], 0.0)
+    p, v_p = np.zeros((problem.contacts, problem.dimension)), None
     if problem.loose_modes.shape[1]:
-        if error > BALANCED:
+        bare = without_friction(problem, deadline)
+        if bare is None or bare.balance > BALANCED:
             return None
-        v_p = bare.v
+        p[:, 0], v_p = bare.p, bare.v
     else:
+        found = drive(problem.with_mu(0.0), time_limit=deadline)
+        if not np.isfinite(found.convergence.error):
+            return None
+        p[:, 0] = np.maximum(found.r[:, 0], 0.0)
         v_p = problem.velocity(p)[1]
     if v_p is None:
         return None

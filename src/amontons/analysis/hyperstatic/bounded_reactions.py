@@ -101,12 +101,12 @@ def confined(
     if np.isfinite(bound):
         distance = _proved(scaled, z0, bound, deadline)
         if distance is not None and distance <= NEAR * size:
-            return Confined(np.inf, bound, distance / size)
+            return Confined(np.inf, bound, scaled.relative(distance, known))
     for times in TIMES:
         distance = _proved(scaled, z0, times * largest, deadline)
         if distance is None or distance > NEAR * size:
             break
-        found = Confined(times * largest, bound, distance / size)
+        found = Confined(times * largest, bound, scaled.relative(distance, known))
     if found is not None and found.within >= found.bound:
         return replace(found, within=np.inf)
     return found

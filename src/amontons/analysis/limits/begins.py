@@ -11,20 +11,14 @@ minimum that no descent can be sure of.  It is bounded here from both sides.
 - `upper`: a state (r, w) that obeys (1) at x.  Candidates w are the mechanisms of a sequence of
   linear programs whose friction bounds mu r_N are those of the program before ([GCA]), and that
   of the relaxation below; for each w the least x of an r that fits it is one more program.
-- `lower`: every product of an equation of (1) in y = (r, x, 1) with w, and of an inequality in
-  y with u_N >= 0, is linear in V = y w^T, as are r_N u_N = 0 and |mu r_N u_T| <= -r_T u_T.
-  So is x = sum live_j V_xj where live.w = 1.  The least of it over all V, products or not, is a
-  linear program ([SA], first level), and no more than the least x.  Its multipliers are the
-  proof: c - A^T y, their combination of the rows, leaves nothing but the bound.
-
-The forces of a straight face, whose contacts all have the same tangential motion, are its
-normal forces and one tangential force, of at most mu times their sum.
+- `lower`: linear programs in products of forces with motions (`relaxation`), first a small one,
+  then, where a gap is left, a tighter one whose contacts are decided one by one (`branching`).
+  Their motions are candidates for `upper`, too: sequences of programs tend to miss the least.
 
 [FT] M. C. Ferris, F. Tin-Loi, "Limit analysis of frictional block assemblies as a mathematical
 program with complementarity constraints", Int. J. Mech. Sci. 43 (2001) 209-224.
 [GCA] M. Gilbert, C. Casapulla, H. M. Ahmed, "Limit analysis of masonry block structures with
 non-associative frictional joints using linear programming", Comput. Struct. 84 (2006) 873-887.
-[SA] H. D. Sherali, W. P. Adams, SIAM J. Discrete Math. 3 (1990) 411-430.
 """
 
 from __future__ import annotations
@@ -41,6 +35,8 @@ from scipy import sparse
 from ...core.clock import Deadline
 from ...core.errors import TimeUp
 from ...core.faces import Told
+from .branching import Branching
+from .relaxation import Relaxation
 
 Array = NDArray[np.float64]
 Places = NDArray[np.int64]
@@ -48,8 +44,6 @@ PROGRAMS = 40  # of the sequence
 KEPT = (0.4, 0.7)  # of the friction bounds of the program before, one sequence each
 STILL = 1e-7  # velocity, of the largest of a mechanism, that counts as none
 ACCEPTED = 1e-6  # by which a state may miss (1), relative
-RESIDUAL = 1e-6  # that multipliers may leave of the rows that they combine
-WORK = 2200.0  # operations of the relaxation per square of its unknowns, measured
 PROGRAM = 2e8  # of one program of the sequence, roughly
 
 
@@ -135,38 +129,80 @@ class Assembly:
         ))  # fmt: skip
 
 
-def begins(blocks: Assembly, most: float, first: Array, deadline: Deadline) -> Begins:
-    """Bounds between 0 and most, the load beyond which there is no balance, with r `first`."""
-    best, mechanism = Begins(0.0, np.inf, None, None, 0.0, 0.0, 0), None
-    lower, residual, unknowns = 0.0, 0.0, 0
+def begins(
+    blocks: Assembly, most: float, first: Array, deadline: Deadline, gap: float = 0.0
+) -> Begins:
+    """Bounds between 0 and most, the load beyond which there is no balance, with r `first`.
+
+    gap: relative distance of both that is good enough.
+    """
+    found = _Found(blocks)
     try:
-        relaxed = _Relaxation(blocks)
-        unknowns = relaxed.unknowns
-        deadline.pay(WORK * float(unknowns) ** 2)
-        lower, residual, mechanism = relaxed.solved(most, deadline)
+        relaxed = Relaxation(blocks, signed=False)
+        found.unknowns = relaxed.unknowns
+        answer = relaxed.bound(most, deadline)
+        found.rise(answer.value, answer.residual)
+        found.take(answer.motion)
     except TimeUp:
         pass
-    for w in _mechanisms(blocks, first, mechanism, deadline):
-        found = state_of(blocks, w)
-        if found is None:
-            continue
-        x, r, w = found
-        missed = blocks.violation(x, r, w)
-        if missed <= ACCEPTED and x < best.upper:
-            best = Begins(0.0, x, r, w, missed, 0.0, 0)
-        if best.upper * (1 - ACCEPTED) <= lower:
+    for w in _mechanisms(blocks, first, deadline):
+        if found.meet(ACCEPTED):
             break
-    return Begins(min(lower, best.upper), best.upper, best.r, best.w, best.violation, residual,
-                  unknowns)  # fmt: skip
+        found.take(w)
+    if not found.meet(max(gap, ACCEPTED)):
+        _branch(found, most, deadline, gap)
+    best = found.best
+    return Begins(min(found.lower, best.upper), best.upper, best.r, best.w, best.violation,
+                  found.residual, found.unknowns)  # fmt: skip
+
+
+def _branch(found: _Found, most: float, deadline: Deadline, gap: float) -> None:
+    """The tighter relaxation, its contacts decided one by one as long as there is time."""
+    try:
+        relaxed = Relaxation(found.blocks, signed=True)
+        tree = Branching(relaxed, min(most, found.best.upper), deadline)
+        for w in tree.motions():
+            found.unknowns = relaxed.unknowns
+            found.take(w)
+            tree.lower_cut(found.best.upper)
+            found.rise(tree.lower, tree.residual)
+            if found.meet(max(gap, ACCEPTED)):
+                return
+        found.rise(tree.lower, tree.residual)
+    except TimeUp:
+        pass
+
+
+class _Found:
+    """The best bounds so far."""
+
+    def __init__(self, blocks: Assembly) -> None:
+        self.blocks, self.unknowns = blocks, 0
+        self.lower = self.residual = 0.0
+        self.best = Begins(0.0, np.inf, None, None, 0.0, 0.0, 0)
+
+    def take(self, w: Array | None) -> None:
+        """A motion, if it has a state at a load below that of all others."""
+        found = None if w is None else state_of(self.blocks, w)
+        if found is None:
+            return
+        missed = self.blocks.violation(*found)
+        if missed <= ACCEPTED and found[0] < self.best.upper:
+            self.best = Begins(0.0, *found, missed, 0.0, 0)
+
+    def rise(self, lower: float, residual: float) -> None:
+        """A lower bound, and what its multipliers leave."""
+        if lower > self.lower:
+            self.lower, self.residual = lower, residual
+
+    def meet(self, gap: float) -> bool:
+        """Whether both bounds are as near as that."""
+        return self.best.upper * (1 - gap) <= self.lower
 
 
 # -------------------------------------------------------------------------- from above
-def _mechanisms(
-    blocks: Assembly, first: Array, more: Array | None, deadline: Deadline
-) -> Iterator[Array]:
-    """Motions to look at: that of the relaxation, and those of the sequence of programs."""
-    if more is not None:
-        yield more
+def _mechanisms(blocks: Assembly, first: Array, deadline: Deadline) -> Iterator[Array]:
+    """The motions of the sequences of programs."""
     for kept in KEPT:
         yield from _sequence(blocks, first[:, 0], kept, deadline)
 
@@ -250,82 +286,3 @@ def state_of(blocks: Assembly, w: Array) -> tuple[float, Array, Array] | None:
     if found.status != 0:
         return None
     return float(found.x[-1]), found.x[:-1].reshape(nc, 2), w / power
-
-
-# -------------------------------------------------------------------------- from below
-class _Relaxation:
-    """The linear program in V = y w^T, y = (N of contacts, T of faces, x, 1), row by row."""
-
-    def __init__(self, blocks: Assembly) -> None:
-        G, mu = blocks.dense, blocks.mu
-        self.owner, nf = blocks.faces
-        nc, n = len(mu), len(G)
-        first = np.array([np.flatnonzero(self.owner == f)[0] for f in range(nf)], dtype=int)
-        self.opening = sparse.csr_array(G[:, ::2].T)  # u_N of w
-        self.sliding = sparse.csr_array(G[:, 1::2].T[first])  # u_T of faces
-        self.rows, self.n, self.live = nc + nf + 2, n, blocks.live
-        self.balance = sparse.csr_array(
-            np.column_stack([G[:, ::2], G[:, 1::2][:, first], blocks.live, blocks.dead])
-        )
-        self.force = sparse.csr_array(
-            (mu, (self.owner, np.arange(nc))), shape=(nf, self.rows)
-        )  # mu sum N of faces
-        self.shear = sparse.csr_array(
-            (np.ones(nf), (np.arange(nf), nc + np.arange(nf))), shape=(nf, self.rows)
-        )
-
-    @property
-    def unknowns(self) -> int:
-        """Entries of V."""
-        return self.rows * self.n
-
-    def _picked(self, k: int) -> sparse.csr_array:
-        """The row that takes entry k of y."""
-        return sparse.csr_array(([1.0], ([0], [k])), shape=(1, self.rows))
-
-    def program(self, most: float) -> tuple[Array, Any, Any, Array]:
-        """(c, A of A V <= 0, E of E V = e, e); V flat."""
-        nc, last = self.opening.shape[0], self.rows - 1
-        normal = sparse.csr_array(sparse.eye_array(nc, self.rows))
-        x, one = self._picked(last - 1), self._picked(last)
-        inside = sparse.vstack(
-            [normal, self.force + self.shear, self.force - self.shear, x, most * one - x]
-        )
-        slip = [
-            sparse.vstack([sparse.kron(t + sign * f, u) for t, f, u in self._by_face()])
-            for sign in (1.0, -1.0)
-        ]  # T u_T + mu N |u_T| <= 0
-        A = sparse.vstack([-sparse.kron(inside, self.opening), *slip], format="csr")
-        apart = sparse.vstack(
-            [sparse.kron(normal[[i]], self.opening[[i]]) for i in range(nc)]
-        )  # r_N u_N = 0
-        live = sparse.csr_array(self.live[None])
-        E = sparse.vstack([
-            sparse.kron(self.balance, sparse.eye_array(self.n)), apart, sparse.kron(one, live),
-        ], format="csr")  # fmt: skip
-        e = np.zeros(E.shape[0])
-        e[-1] = 1.0
-        return sparse.kron(x, live).toarray().ravel(), A, E, e
-
-    def _by_face(self) -> list[tuple[Any, Any, Any]]:
-        """(T, mu sum N, u_T) of every face."""
-        count = self.sliding.shape[0]
-        return [(self.shear[[f]], self.force[[f]], self.sliding[[f]]) for f in range(count)]
-
-    def solved(self, most: float, deadline: Deadline) -> tuple[float, float, Array | None]:
-        """(bound, what its multipliers leave of the rows, the motion of the relaxation)."""
-        from scipy.optimize import linprog
-
-        c, A, E, e = self.program(most)
-        limit = {} if deadline.work is not None else {"time_limit": max(deadline.left, 0.1)}
-        found = linprog(c, A, np.zeros(A.shape[0]), E, e, (None, None), method="highs-ipm",
-                        options=limit)  # fmt: skip
-        if found.status != 0:
-            return 0.0, 0.0, None
-        # multipliers of equations and, at most zero, of inequalities: the proof
-        y, z = np.asarray(found.eqlin.marginals), np.asarray(found.ineqlin.marginals)
-        z = np.minimum(z, 0.0)
-        residual = float(np.abs(c - E.T @ y - A.T @ z).max()) / float(np.abs(c).max())
-        motion = np.asarray(found.x).reshape(self.rows, self.n)[-1]
-        bound = float(e @ y) * (1 - ACCEPTED)
-        return (bound if residual <= RESIDUAL else 0.0), residual, motion

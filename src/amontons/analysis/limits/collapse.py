@@ -128,7 +128,7 @@ def collapse_load(
     if upper == np.inf:
         return Collapse(0.0, np.inf, None, None, True, 1, now() - began,
                         "Any live load is balanced.")  # fmt: skip
-    first = blocks.begins(upper, r)
+    first = blocks.begins(upper, r, gap)
     lower, reason = blocks.lower(upper, gap, deadline)
     lower, upper = min(lower, upper) * blocks.factor, upper * blocks.factor
     if first is not None:  # what nothing begins below, the live load does not begin either
@@ -213,12 +213,12 @@ class _Blocks:
         r = self.size * found.x[:m].reshape(self.nc, self.d)
         return float(found.x[m]), r, motion
 
-    def begins(self, most: float, r: Array) -> Begins | None:
+    def begins(self, most: float, r: Array, gap: float) -> Begins | None:
         """Bounds on the load at which a motion begins that the live load drives, in 2D."""
         if self.d != 2:
             return None
         plane = Assembly(self.G, self.dead, self.live, self.mu, self.face)
-        found = begins(plane, most, r / self.size, self.deadline.share(BEGINS))
+        found = begins(plane, most, r / self.size, self.deadline.share(BEGINS), gap)
         found = replace(found, lower=found.lower * self.factor, upper=found.upper * self.factor)
         if found.r is None or found.w is None:
             return found

@@ -284,9 +284,9 @@ def _merged(
         else:
             group.append(item)
     degrees = _disjoint(piece, groups)
-    largest = max((float(np.abs(g[0].r).max(initial=0.0)) for g in groups), default=0.0)
+    first = [group[0].r.reshape(-1, 2) for group in groups]
     for group, known in zip(groups, degrees, strict=True):
-        yield _entry(piece, group, known, max(largest, 1.0)), known.value
+        yield _entry(piece, group, known, first), known.value
 
 
 def _disjoint(piece: PlaneProblem, groups: list[list[PieceAnswer]]) -> list[Degree]:
@@ -336,13 +336,14 @@ def _belongs(piece: PlaneProblem, item: PieceAnswer, group: list[PieceAnswer]) -
 
 
 def _entry(
-    piece: PlaneProblem, group: list[PieceAnswer], known: Degree, largest: float
+    piece: PlaneProblem, group: list[PieceAnswer], known: Degree, listed: list[Array]
 ) -> PieceSolution:
-    """What a group of answers stands for."""
+    """What a group of answers stands for, of all that are listed, (nc, 2) each."""
     first, value = group[0], known.value or 0
     least = max(abs(value), sum(a.exists for a in group), 2 if first.freedom else 0)
-    apart = max(float((np.abs(a.r - first.r) + a.off_r).max(initial=0.0))
-                for a in group if not a.freedom or a is first)  # fmt: skip
+    apart = np.max([np.abs(a.r - first.r) + a.off_r
+                    for a in group if not a.freedom or a is first], axis=0)  # fmt: skip
+    distance = piece.scaled.relative(apart.reshape(-1, 2), *listed)
     problem, to_r = piece.scaled.problem, piece.scaled.to_r
     reaction = first.r.reshape(-1, 2) * to_r
     velocity = np.array(problem.velocity(reaction)[0])
@@ -351,7 +352,7 @@ def _entry(
     energy = float(first.r @ piece.W @ first.r) / 2 * unit
     return PieceSolution(
         word(first.states), tuple(word(a.states) for a in group[1:]), reaction, velocity,
-        error, value, energy, first.freedom, known.sole, least, apart / largest, first.still,
+        error, value, energy, first.freedom, known.sole, least, distance, first.still,
     )  # fmt: skip
 
 

@@ -113,9 +113,9 @@ def _by_contacts(scaled: Scaled, r: Array, deadline: Deadline) -> LoadMultiplier
 
 def _certified(scaled: Scaled, by: LoadMultipliers, began: float) -> LoadCertificate:
     """The answer by multipliers of every contact."""
-    size = max(1.0, float(np.abs(by.r0 / scaled.to_r).max(initial=0.0)))
+    distance = scaled.relative(by.distance, by.r0 / scaled.to_r)
     reason = "multipliers of every contact exclude all others"
-    return LoadCertificate(LoadOutcome.CERTIFIED, None, (), by.r0, by.distance / size, 1,
+    return LoadCertificate(LoadOutcome.CERTIFIED, None, (), by.r0, distance, 1,
                            reason, now() - began, multipliers=by)  # fmt: skip
 
 

@@ -172,7 +172,8 @@ class PlaneTree(RegionTree):
     @property
     def resolution(self) -> float:
         """Bound of the difference of reactions to those known, relative to the largest."""
-        return max((proof.distance for proof in self.proofs), default=0.0) / self.size
+        off = max((proof.distance for proof in self.proofs), default=0.0)
+        return self.scaled.relative(off, self.known)
 
     @property
     def branches(self) -> tuple[LoadBranch, ...]:

@@ -109,16 +109,16 @@ class DiscSearch(RegionTree):
 
     @property
     def resolution(self) -> float:
-        """How far another solution can be, scaled, from one that is taken to be on a border.
+        """How far another solution can be from one that is taken to be on a border, relative.
 
         A reference within ON of another status counts as having both.  What it is off by, other
         solutions may be off by as much more as W is soft.
         """
         off = max((_off_border(self.scaled, r) for r in self.finder.found), default=0.0)
-        if off == 0.0:
-            return ON
-        softest = max(float(np.linalg.eigvalsh(self.scaled.symmetric)[0]), np.finfo(float).tiny)
-        return max(ON, off / softest)
+        if off > 0.0:
+            softest = float(np.linalg.eigvalsh(self.scaled.symmetric)[0])
+            off /= max(softest, np.finfo(float).tiny)
+        return self.scaled.relative(max(ON, off), *self.finder.found)
 
     @property
     def _missing(self) -> str | None:
