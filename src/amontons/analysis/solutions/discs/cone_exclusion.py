@@ -35,6 +35,7 @@ EPSILON = float(np.finfo(float).eps)
 ENTERS = 1e-9  # violation of a ray, relative to its length, from which it is taken up
 STEPS = 60  # rays taken up, after which nothing is known
 DEPENDENT = 1e-12  # pivot of Cholesky's factor, relative, of rays that depend on each other
+ALIKE = 1e-3  # relative difference of loads that are tried as one
 HALF_CIRCLE = math.pi / 2  # half an arc from which u_T may point anywhere
 
 
@@ -183,11 +184,16 @@ def _most_violated_inplace(W, left, states, arcs, mus, loads, most, column, ray)
                 best, kind = value, i + (nc if part == 2 else 0)
                 copy_inplace(column, trial)
                 copy_inplace(ray, own)
-    for part in range(3):  # both loads, and what is left of R
+    apart = size = 0.0
+    for k in range(m):
+        apart += (loads[1, k] - loads[0, k]) ** 2
+        size += loads[0, k] ** 2
+    alike = apart <= ALIKE**2 * size
+    for part in range(1 if alike else 0, 3):  # both loads, or their mean; what is left of R
         trial[:] = 0.0
         if part < 2:
             for k in range(m):
-                trial[k] = loads[part, k]
+                trial[k] = (loads[0, k] + loads[1, k]) / 2 if alike else loads[part, k]
             trial[m], trial[m + 1] = -1.0, 1.0
         else:
             trial[m] = 1.0

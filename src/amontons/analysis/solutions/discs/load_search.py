@@ -33,7 +33,7 @@ ROOM = 20_000  # boxes on the stack
 TURN = 500  # leaves of one turn
 LEFT = 200  # boxes that are left, after which nothing more is looked at
 BOX = 2e5, 400.0  # operations of a box, and per cube of the reactions
-LEAF = 20  # boxes that a leaf counts for
+LEAF = 5  # boxes that a leaf counts for
 FINEST = 1e-6  # half of an arc, or of a span of t, that is not divided
 POINT = 1e-9  # of x_k: what of a curve may stay open at the end of a sure part
 SHRUNK = 0.7  # of an arc or span: after that much a box is looked at again
@@ -215,7 +215,7 @@ class _Search:
         normal, speed = guess[:, 0], np.hypot(guess[:, 4], guess[:, 5])
         friction = np.abs(self.mu[0] + box.x[-1] * self.mu[1])
         weight = np.zeros(pattern.n + 1)
-        weight[pattern.turn] = (1e-6 + friction * normal + speed)[pattern.slip]
+        weight[pattern.turn] = (1e-3 + friction * normal + speed)[pattern.slip]
         weight[-1] = np.linalg.norm(self.q[1]) + np.abs(self.mu[1]) @ normal + 1e-6
         j = int(np.argmax(np.where(box.half > FINEST, weight * box.half, -1.0)))
         for sign in (-1.0, 1.0):
