@@ -16,7 +16,7 @@ the least-squares problem
 
 over the rays c_j of the cones, W r or -u; [LH] takes them up one by one, here the one that is
 violated most of all rays that a cone has, so that discs and arcs are exact.  A further row
-holds sum r_N <= R.  That y proves anything is checked with a bound of all rounding.
+holds sum r_N <= R; rows of u_T that may be anything are left out.  That y proves anything is checked with a bound of all rounding.
 
 [LH] C. Lawson, R. Hanson, "Solving least squares problems" (1974), chapter 23, NNLS.
 [HUL] J.-B. Hiriart-Urruty, C. Lemaréchal, "Fundamentals of convex analysis" (2001), A.4.
@@ -35,7 +35,7 @@ EPSILON = float(np.finfo(float).eps)
 ENTERS = 1e-9  # violation of a ray, relative to its length, from which it is taken up
 STEPS = 60  # rays taken up, after which nothing is known
 DEPENDENT = 1e-12  # pivot of Cholesky's factor, relative, of rays that depend on each other
-ALIKE = 1e-3  # relative difference of loads that are tried as one
+ALIKE = 1e-3  # loads, or rays of one arc, that are no further apart are tried as one
 HALF_CIRCLE = math.pi / 2  # half an arc from which u_T may point anywhere
 
 
@@ -47,8 +47,9 @@ def copy_inplace(out, x):
 
 
 @njit(cache=True)
-def nearest_on_arc(angle, middle, half):
-    """The angle on an arc that is nearest to another angle."""
+def _on_arc(angle, arcs, i):
+    """The angle on the arc of a contact that is nearest to another; the middle of small ones."""
+    middle, half = arcs[0, i], arcs[1, i] if arcs[1, i] > ALIKE else 0.0
     off = angle - middle
     off -= 2 * math.pi * np.round(off / (2 * math.pi))
     return middle + min(max(off, -half), half)
@@ -133,6 +134,14 @@ def _enter_inplace(W, i, ray, most, column):
 
 
 @njit(cache=True)
+def _masked_inplace(column, states, arcs):
+    """Leave out the rows of u_T that may be anything."""
+    for i in range(len(states)):
+        if states[i] != STICK and (states[i] != SLIP or arcs[1, i] >= HALF_CIRCLE):
+            column[3 * i + 1] = column[3 * i + 2] = 0.0
+
+
+@njit(cache=True)
 def _along(column, left):
     """Product of a column of length 1 with what is left."""
     value = size = 0.0
@@ -155,7 +164,8 @@ def _most_violated_inplace(W, left, states, arcs, mus, loads, most, column, ray)
         state = states[i]
         for part in range(3):  # reaction with the least and the largest mu, velocity
             if part < 2:
-                if state == FREE or (part == 0 and state != SLIP):
+                few = state != SLIP or mus[1, i] - mus[0, i] <= ALIKE * mus[1, i]
+                if state == FREE or (part == 0 and few):
                     continue
                 a = b = 0.0
                 for k in range(m):
@@ -164,7 +174,7 @@ def _most_violated_inplace(W, left, states, arcs, mus, loads, most, column, ray)
                 mu = 0.0 if state == FRICTIONLESS else mus[part, i]
                 angle = math.atan2(b, a)
                 if state == SLIP:
-                    angle = nearest_on_arc(angle + math.pi, arcs[0, i], arcs[1, i]) + math.pi
+                    angle = _on_arc(angle + math.pi, arcs, i) + math.pi
                 own[0], own[1], own[2] = 1.0, mu * math.cos(angle), mu * math.sin(angle)
                 _enter_inplace(W, i, own, most, trial)
             elif state == FREE or state == ANY:
@@ -173,12 +183,13 @@ def _most_violated_inplace(W, left, states, arcs, mus, loads, most, column, ray)
                 trial[3 * i] = -1.0
             elif state == SLIP and arcs[1, i] < HALF_CIRCLE:
                 angle = math.atan2(-left[3 * i + 2], -left[3 * i + 1])
-                angle = nearest_on_arc(angle, arcs[0, i], arcs[1, i])
+                angle = _on_arc(angle, arcs, i)
                 own[0], own[1], own[2] = 0.0, math.cos(angle), math.sin(angle)
                 trial[:] = 0.0
                 trial[3 * i + 1], trial[3 * i + 2] = -own[1], -own[2]
             else:
                 continue
+            _masked_inplace(trial, states, arcs)
             value = _along(trial, left)
             if value > best:
                 best, kind = value, i + (nc if part == 2 else 0)
@@ -197,6 +208,7 @@ def _most_violated_inplace(W, left, states, arcs, mus, loads, most, column, ray)
             trial[m], trial[m + 1] = -1.0, 1.0
         else:
             trial[m] = 1.0
+        _masked_inplace(trial, states, arcs)
         value = _along(trial, left)
         if value > best:
             best, kind = value, 2 * nc

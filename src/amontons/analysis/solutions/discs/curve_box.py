@@ -28,7 +28,7 @@ from .curve_equations import (
 Array = NDArray[np.float64]
 Index = NDArray[np.int64]
 NEWTON = 10  # steps to the centre
-FAR = 4.0  # half widths of the box that these may go
+FAR = 4.0  # times the box, and what the curve moves in it, that these may go
 END = 1e-13  # of the last one, relative to 1 + |x|
 UP = 1 + 1e-12  # rounding of bounds
 CUT = 0.9  # of a width: a range that leaves more changes nothing
@@ -166,13 +166,15 @@ def traced(pattern: Pattern, boxes: Boxes, k: Index, whole: tuple[float, float])
     start, known = pattern.with_linear_part(boxes.x)
     x, converged = on_curve(pattern, start, k)
     wide = boxes.half.copy()
-    off = np.abs(x - boxes.x)
-    known &= converged & (off[:, ny:] <= FAR * wide[:, ny:] + 1e-9).all(axis=1)
+    known &= converged
     x = np.where(known[:, None], x, start)
     at = pattern.local(x)
     P, d, fine = _preconditioner(at, k)
     h = wide[each, k]
-    half = np.maximum(wide + np.abs(x - boxes.x), 1.1 * np.abs(d) * h[:, None] + 0.05 * wide)
+    off = np.abs(x - boxes.x)
+    far = FAR * (wide + np.abs(d) * h[:, None]) + 1e-9
+    known &= (off[:, ny:] <= far[:, ny:]).all(axis=1)
+    half = np.maximum(wide + off, 1.1 * np.abs(d) * h[:, None] + 0.05 * wide)
     half = half * UP + 1e-13
     half[each, k] = h
     dy, small = pattern.range_of_y(at, half)

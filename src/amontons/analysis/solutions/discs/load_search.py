@@ -28,6 +28,7 @@ from .curve_equations import Pattern
 from .load_tree import PARTS, leaves_inplace
 
 Array = NDArray[np.float64]
+LARGEST = 10  # contacts up to which a search is tried
 BUDGET = 2000  # boxes between two looks at the clock
 ROOM = 20_000  # boxes on the stack
 TURN = 500  # leaves of one turn
