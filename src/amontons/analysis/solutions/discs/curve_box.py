@@ -110,12 +110,26 @@ def _breaks_a_sign(pattern: Pattern, at: Local, by: Spread, half: Array) -> Mask
     return fails | (normal[:, k] < 0).any(axis=1) | (friction * normal[:, k] < least).any(axis=1)
 
 
+def _with_y(pattern: Pattern, boxes: Boxes) -> tuple[Local, Array, Mask]:
+    """(the middles with some y, how far y is from it in the boxes, where that is known)."""
+    x, fine = pattern.with_y(boxes.x, few=True)
+    dy, small = pattern.range_of_y(pattern.local(x), boxes.half, few=True)
+    fine &= small
+    if not fine.all():
+        rest = np.flatnonzero(~fine)
+        x[rest], also = pattern.with_y(boxes.x[rest], few=False)
+        dy[rest], small = pattern.range_of_y(
+            pattern.local(x[rest]), boxes.half[rest], few=False
+        )
+        fine[rest] = also & small
+    return pattern.local(x), dy, fine
+
+
 def narrowed(pattern: Pattern, boxes: Boxes) -> tuple[Mask, Boxes, Index]:
     """(which boxes surely hold nothing, all of them narrowed, the parameter k or -1)."""
-    x, fine = pattern.with_linear_part(boxes.x)
-    at, half, ny = pattern.local(x), boxes.half.copy(), pattern.ny
-    half[:, :ny], small = pattern.range_of_y(at, half)
-    fine &= small
+    at, dy, fine = _with_y(pattern, boxes)
+    x, half, ny = at.x, boxes.half.copy(), pattern.ny
+    half[:, :ny] = dy
     by = pattern.spread(at, half)
     empty = fine & _breaks_a_sign(pattern, at, by, half)
     weight = half.copy()
@@ -163,7 +177,7 @@ def on_curve(pattern: Pattern, x: Array, k: Index) -> tuple[Array, Mask]:
 def traced(pattern: Pattern, boxes: Boxes, k: Index, whole: tuple[float, float]) -> Curves:
     """The curve in every box, with parameters k (B,); whole: the values of t."""
     ny, each = pattern.ny, np.arange(len(k))
-    start, known = pattern.with_linear_part(boxes.x)
+    start, known = pattern.with_y(boxes.x, few=False)
     x, converged = on_curve(pattern, start, k)
     wide = boxes.half.copy()
     known &= converged
@@ -177,7 +191,7 @@ def traced(pattern: Pattern, boxes: Boxes, k: Index, whole: tuple[float, float])
     half = np.maximum(wide + off, 1.1 * np.abs(d) * h[:, None] + 0.05 * wide)
     half = half * UP + 1e-13
     half[each, k] = h
-    dy, small = pattern.range_of_y(at, half)
+    dy, small = pattern.best_range_of_y(at, half)
     known &= fine & small
     half[:, :ny] = np.maximum(1.1 * dy, 1.2 * np.abs(d[:, :ny]) * h[:, None]) + 1e-13
     half[~known] = 1.0

@@ -168,35 +168,59 @@ class Pattern:
         r[:, self.B] = -push * np.sin(x[:, self.turn])
         return r
 
-    def with_linear_part(self, x: Array) -> tuple[Array, Mask]:
-        """(x with the y of its angles and t, where the equations are regular)."""
+    def _y_from(self, at: Local, few: bool) -> tuple[Array, Mask]:
+        """X (B, ny, n) with y = -X F(0): of the linear equations alone, or least squares."""
+        B, ny = len(at.x), self.ny
+        X = np.zeros((B, ny, self.n))
+        if few:
+            X[:, :, :ny], fine = inverses(at.J[:, :ny, :ny])
+            return X, fine
+        J = at.J[:, :, :ny]
+        inverse, fine = inverses(J.transpose(0, 2, 1) @ J)
+        return inverse @ J.transpose(0, 2, 1), fine
+
+    def with_y(self, x: Array, *, few: bool) -> tuple[Array, Mask]:
+        """(x with the y that its angles and t give, where they do)."""
         x, ny = x.copy(), self.ny
         x[:, :ny] = 0.0
         at = self.local(x)
-        X, fine = inverses(at.J[:, :ny, :ny])
-        x[:, :ny] = -(X @ at.F[:, :ny, None])[:, :, 0]
+        X, fine = self._y_from(at, few)
+        x[:, :ny] = -(X @ at.F[:, :, None])[:, :, 0]
         return x, fine
 
     # ------------------------------------------------------------------ ranges
-    def range_of_y(self, at: Local, half: Array) -> tuple[Array, Mask]:
-        """(bound of |y - y_c| for all that solves the linear equations, where there is one).
+    def range_of_y(self, at: Local, half: Array, *, few: bool) -> tuple[Array, Mask]:
+        """(bound of |y - y_c| for all that solves the equations in a box, where there is one).
 
-        half (B, n + 1): of boxes; that of y is not used.
+        half (B, n + 1): of boxes; that of y is not used.  few: by the linear equations alone,
+        which tells most, but for where they are singular for some angles.
         """
         ny = self.ny
-        E = at.J[:, :ny, :ny]
-        X, fine = inverses(E)
-        none = half.copy()
-        none[:, :ny] = 0.0
-        dC = self._spread_of_reactions(at, none)[1][:, :, :ny]
-        D = np.abs(X @ at.V[:, self.of_y]) @ dC + np.abs(X @ E - np.eye(ny))
-        D += 4 * EPSILON * (ny + 4) * (np.abs(X) @ np.abs(E))
-        b = (D @ np.abs(at.x[:, :ny, None]))[:, :, 0]
-        b += np.abs((X @ at.p[:, self.of_y, 1:])[:, :, 0]) * half[:, -1:]
-        b += np.abs((X @ at.F[:, :ny, None])[:, :, 0])
-        b += (np.abs(X) @ at.rounding[:, self.of_y, None])[:, :, 0]
+        X, fine = self._y_from(at, few)
+        fixed = half.copy()
+        fixed[:, :ny] = 0.0
+        by = self.spread(at, fixed)  # F is linear in y: about y_c all that matters
+        change = np.abs(X @ at.V[:, self.rows]) @ by.dC + np.abs(X) @ by.across
+        change += 4 * EPSILON * (self.n + 4) * (np.abs(X) @ np.abs(at.J))
+        off = X @ at.J
+        D = change[:, :, :ny] + np.abs(off[:, :, :ny] - np.eye(ny))
+        b = (D @ np.abs(at.x[:, :ny, None]))[:, :, 0] if few else np.zeros((len(X), ny))
+        if few:  # the turning of contacts is all in D, and the load is linear in t
+            b += np.abs((X @ at.p[:, self.rows, 1:])[:, :, 0]) * half[:, -1:]
+        else:
+            b += ((np.abs(off) + change) @ fixed[:, :, None])[:, :, 0]
+        b += np.abs((X @ at.F[:, :, None])[:, :, 0])
+        b += (np.abs(X) @ at.rounding[:, self.rows, None])[:, :, 0]
         e, small = fixed_point(D, b)
         return e, fine & small
+
+    def best_range_of_y(self, at: Local, half: Array) -> tuple[Array, Mask]:
+        """`range_of_y` by the linear equations, and by all where these are singular."""
+        dy, fine = self.range_of_y(at, half, few=True)
+        if not fine.all():
+            other, also = self.range_of_y(at, half, few=False)
+            dy, fine = np.where(fine[:, None], dy, other), fine | also
+        return dy, fine
 
     def _spread_of_reactions(self, at: Local, half: Array) -> tuple[Array, Array]:
         """(bounds of |r - r_c|, of the change of its derivatives) over boxes."""
