@@ -126,7 +126,8 @@ def bifurcation_diagram(
     """The branches through all solutions, and those that leave them.
 
     at: values of the parameter at which all solutions are searched for with
-    `enumerate_solutions` or, in 3D, `enumerate_discs`, which at each has half of its share of the time.  Without them the
+    `enumerate_solutions` or, in 3D, `enumerate_discs`, which at each has half of its share of
+    the time.  Without them the
     whole interval, and both ends and the middle where that is not proved.
     options: those of step-by-step continuation, also where the curves are straight.
     """
@@ -232,8 +233,8 @@ class _Drawn:
             spans = ", ".join(f"{p:.9g} to {q:.9g}" for p, q in self.undecided[:SPANS])
             more = len(self.undecided) - SPANS
             return (
-                f"all solutions at {values} are on these branches, and all others but for values "
-                f"from {spans}" + (f" and {more} more" if more > 0 else "")
+                f"all solutions at {values} are on these branches, and all others but for "
+                f"values from {spans}" + (f" and {more} more" if more > 0 else "")
                 + f", where nothing is proved ({self.why_not_whole})"
             )
         tried = f" ({self.why_not_whole})" if self.why_not_whole else ""

@@ -16,7 +16,8 @@ the least-squares problem
 
 over the rays c_j of the cones, W r or -u; [LH] takes them up one by one, here the one that is
 violated most of all rays that a cone has, so that discs and arcs are exact.  A further row
-holds sum r_N <= R; rows of u_T that may be anything are left out.  That y proves anything is checked with a bound of all rounding.
+holds sum r_N <= R; rows of u_T that may be anything are left out.  That y proves anything is
+checked with a bound of all rounding.
 
 [LH] C. Lawson, R. Hanson, "Solving least squares problems" (1974), chapter 23, NNLS.
 [HUL] J.-B. Hiriart-Urruty, C. Lemaréchal, "Fundamentals of convex analysis" (2001), A.4.
@@ -48,7 +49,7 @@ def copy_inplace(out, x):
 
 @njit(cache=True)
 def _on_arc(angle, arcs, i):
-    """The angle on the arc of a contact that is nearest to another; the middle of small ones."""
+    """The angle on the arc of a contact that is nearest to another, or its middle."""
     middle, half = arcs[0, i], arcs[1, i] if arcs[1, i] > ALIKE else 0.0
     off = angle - middle
     off -= 2 * math.pi * np.round(off / (2 * math.pi))
@@ -220,6 +221,7 @@ def _most_violated_inplace(W, left, states, arcs, mus, loads, most, column, ray)
 def _least_squares_inplace(A, count, right, L, s):
     """s of min |A s - (0, .., 0, right)| over `count` rows of A; False where they depend."""
     m = A.shape[1]
+    own = 0.0
     for i in range(count):
         for j in range(i + 1):
             value = 0.0

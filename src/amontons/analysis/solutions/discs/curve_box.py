@@ -17,12 +17,20 @@ s_0 + s s_1 up to a bound along the curve, which says where it surely holds and 
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from .curve_equations import (
-    EPSILON, Local, Mask, Pattern, Spread, bend, fixed_point, inverses,
+    EPSILON,
+    Local,
+    Mask,
+    Pattern,
+    Spread,
+    bend,
+    fixed_point,
+    inverses,
 )  # fmt: skip
 
 Array = NDArray[np.float64]
@@ -41,7 +49,7 @@ class Boxes:
     x: Array
     half: Array
 
-    def part(self, which: Mask | Index) -> Boxes:
+    def part(self, which: Any) -> Boxes:
         """Some of them."""
         return Boxes(self.x[which], self.half[which])
 
@@ -107,7 +115,8 @@ def _breaks_a_sign(pattern: Pattern, at: Local, by: Spread, half: Array) -> Mask
     friction = np.abs(mu[0] + at.x[:, -1:] * mu[1]) + np.abs(mu[1]) * half[:, -1:]
     least = np.hypot(at.x[:, k + 1], at.x[:, k + 2])
     least -= np.hypot(half[:, k + 1], half[:, k + 2])
-    return fails | (normal[:, k] < 0).any(axis=1) | (friction * normal[:, k] < least).any(axis=1)
+    fails |= (normal[:, k] < 0).any(axis=1)
+    return fails | (friction * normal[:, k] < least).any(axis=1)
 
 
 def _with_y(pattern: Pattern, boxes: Boxes) -> tuple[Local, Array, Mask]:

@@ -18,6 +18,7 @@ All is done for a stack of boxes at a time, the first axis of every array.
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -34,7 +35,7 @@ REGULAR = 1e13  # largest entry of an inverse
 
 def inverses(A: Array) -> tuple[Array, Mask]:
     """(the inverses of a stack, zero where there is none, and where there is one)."""
-    fine = np.isfinite(A).all(axis=(1, 2))
+    fine: Any = np.isfinite(A).all(axis=(1, 2))
     try:
         X = np.linalg.inv(np.where(fine[:, None, None], A, np.eye(A.shape[1])))
     except np.linalg.LinAlgError:

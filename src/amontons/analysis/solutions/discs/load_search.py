@@ -11,6 +11,7 @@ says.  Reactions are bounded by dissipation, as in `plane_problem`.
 from __future__ import annotations
 
 from dataclasses import dataclass, field
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -97,7 +98,7 @@ class _Stack:
         self.top = 0
 
     def push(self, *box: Array | States) -> None:
-        """Put a box on top; what does not fit is kept as a doubt by `is_full`."""
+        """Put a box on top."""
         for array, part in zip(self.arrays, box, strict=True):
             array[self.top] = part
         self.top += 1
@@ -138,8 +139,8 @@ class _Search:
             self._give_up("W is not definite: reactions may grow without bound")
             return
         nc, m = self.interval.scaled.contacts, len(self.W)
-        leaves = (np.zeros((TURN, nc), dtype=np.int8), np.zeros((TURN, nc)),
-                  np.zeros((TURN, nc)), np.zeros((TURN, 2)))  # fmt: skip
+        leaves: Any = (np.zeros((TURN, nc), dtype=np.int8), np.zeros((TURN, nc)),
+                       np.zeros((TURN, nc)), np.zeros((TURN, 2)))  # fmt: skip
         guesses = np.zeros((TURN, nc, 6))
         while self.stack.top:
             self.stack.top, seen, count = leaves_inplace(
@@ -148,7 +149,8 @@ class _Search:
             )  # fmt: skip
             self.seen += seen
             for which in _alike(leaves[0][:count]):
-                self._look_at(*(array[which] for array in (*leaves, guesses)))
+                states, (middle, half, span) = leaves[0][which], (x[which] for x in leaves[1:])
+                self._look_at(states, middle, half, span, guesses[which])
             say(f"interval: {self.seen} boxes, {len(self.curves)} parts of curves")
             self.deadline.spend(BOX[0] * (seen + LEAF * count) + BOX[1] * seen * float(m) ** 3)
             why = self._why_stop(seen)
