@@ -225,9 +225,9 @@ def diagram(
     """All branches of an interval; `whole` of the answer tells where that is proved.
 
     All pieces on the interval are searched for, in 3D with up to ten contacts.  With values
-    `at` of the parameter, and where that search does not end (then at both ends and the middle): all branches through all
-    solutions there, as `all_solutions` finds them, with their share of the time each.  Others
-    as in `follow`.
+    `at` of the parameter, and where that search does not end (then at both ends and the
+    middle): all branches through all solutions there, as `all_solutions` finds them, with
+    their share of the time each.  Others as in `follow`.
     """
     from ..analysis.paths import checks
     from ..analysis.paths.diagram import bifurcation_diagram
