@@ -222,12 +222,12 @@ def diagram(
     interval: tuple[float, float] = (0.0, 1.0), *, base: FrictionProblem | Model | None = None,
     at: Sequence[float] | None = None, options: Continuation | None = None, **limits: Any,
 ) -> Diagram:  # fmt: skip
-    """All branches of an interval, in 2D; `whole` of the answer tells where that is proved.
+    """All branches of an interval; `whole` of the answer tells where that is proved.
 
-    All pieces on the interval are searched for.  With values `at` of the parameter, and where
-    that search does not end (then at both ends and the middle): all branches through all
-    solutions there, as `all_solutions` finds them, with their share of the time each.  Others
-    as in `follow`.
+    All pieces on the interval are searched for, in 3D with up to ten contacts.  With values
+    `at` of the parameter, and where that search does not end (then at both ends and the
+    middle): all branches through all solutions there, as `all_solutions` finds them, with
+    their share of the time each.  Others as in `follow`.
     """
     from ..analysis.paths import checks
     from ..analysis.paths.diagram import bifurcation_diagram

@@ -130,6 +130,8 @@ def _one_solution(
 def _all_branches(
     local: FrictionProblem, diagram: Diagram, end: FrictionProblem | None, deadline: Any
 ) -> Any:
+    if local.dimension != 2:
+        raise InvalidInput("certificate: expected a 2D diagram; those in 3D have no file yet")
     if diagram.whole is None or end is None:
         what = "a diagram that is whole" if end else "end=, the problem at the other load"
         raise InvalidInput(f"certificate: expected {what}; {diagram.reason}")

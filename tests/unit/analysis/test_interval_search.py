@@ -6,7 +6,8 @@ import numpy as np
 import pytest
 
 import amontons as am
-from amontons.analysis.solutions.interval_search import START, pieces_between
+from amontons.analysis.solutions.interval_search import pieces_between
+from amontons.analysis.solutions.load_interval import START
 from amontons.core.clock import Deadline
 from amontons.mechanics.ready.hild import hild_triangle
 

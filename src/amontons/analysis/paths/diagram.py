@@ -1,9 +1,10 @@
 """Bifurcation diagrams: all branches found from all solutions, closed ones included.
 
-In 2D `interval_search` tells all pieces that have a solution anywhere on the interval, with
-proof: every branch goes through the middle of some of them, so that none is missed, wherever it
-begins and ends.  Otherwise branches go through all solutions
-at some values of the parameter, and nothing is known of what passes none of these.
+In 2D `interval_search`, in 3D `load_search` tells all pieces that have a solution anywhere on
+the interval, with proof: every branch goes through the middle of some of them, so that none is
+missed, wherever it begins and ends.  Otherwise branches go through all solutions at some values
+of the parameter, and nothing is known of what passes none of these; where only parts of the
+interval are undecided, these are named.
 """
 
 from __future__ import annotations
@@ -31,9 +32,13 @@ from .tangents import Tangent
 
 if TYPE_CHECKING:
     from ...mechanics.model import Model
+    from ...problem.friction import FrictionProblem
+    from ..solutions.load_interval import Pieces
 
 Array = NDArray[np.float64]
 SEARCH = 20.0  # seconds' work on the whole interval where no time is given
+FEW = 0.5  # of the interval: undecided parts that are less are told in words
+SPANS = 3  # of them
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -45,6 +50,8 @@ class Diagram(Shown):
     closed branch, or one that turns back at both ends, that passes none of `at` is not seen.
     lost: solutions, as (parameter, state), through which no branch could be followed; sets:
     points of connected sets of solutions at one parameter, which are no curves over it.
+    undecided: in 3D, where there is no `whole`, the parts of the interval to which that is due:
+    at all other values the same is proved; empty where nothing is.
     """
 
     branches: tuple[Branch, ...]
@@ -55,6 +62,7 @@ class Diagram(Shown):
     sets: tuple[tuple[float, Array], ...] = ()
     seconds: float = 0.0
     whole: tuple[float, float] | None = None
+    undecided: tuple[tuple[float, float], ...] = ()
 
     def __len__(self) -> int:
         return len(self.branches)
@@ -99,6 +107,7 @@ class Diagram(Shown):
             "branches": [branch.record() for branch in self.branches],
             "at": list(self.at),
             "whole": None if self.whole is None else list(self.whole),
+            "undecided": [list(span) for span in self.undecided],
             "complete": self.complete,
             "reason": self.reason,
             "critical": self.critical,
@@ -117,7 +126,8 @@ def bifurcation_diagram(
     """The branches through all solutions, and those that leave them.
 
     at: values of the parameter at which all solutions are searched for with
-    `enumerate_solutions`, which at each has half of its share of the time.  Without them the
+    `enumerate_solutions` or, in 3D, `enumerate_discs`, which at each has half of its share of
+    the time.  Without them the
     whole interval, and both ends and the middle where that is not proved.
     options: those of step-by-step continuation, also where the curves are straight.
     """
@@ -129,8 +139,7 @@ def bifurcation_diagram(
     a, b = limits.interval
     drawn = _Drawn(timed(path, limits.deadline), limits, options)
     values = (a, (a + b) / 2, b) if at is None else tuple(at)
-    plane = path.start.dimension == 2 and not path.tresca
-    whole = drawn.whole() if at is None and plane else None
+    whole = drawn.whole() if at is None and not path.tresca else None
     if whole is None:
         drawn.through(values)
     return drawn.diagram(values, whole)
@@ -149,36 +158,39 @@ class _Drawn:
         self.sets: list[tuple[float, Array]] = []
         self.doubts: list[str] = []
         self.why_not_whole = ""
+        self.undecided: tuple[tuple[float, float], ...] = ()
 
     def whole(self) -> tuple[float, float] | None:
         """Branches through all pieces of the interval; where that is all proved, else None."""
-        from ..solutions.enumerate import CONTACTS
-        from ..solutions.interval_search import pieces_between
-
         a, b = self.limits.interval
         deadline = self.limits.deadline
         search = deadline.share(0.25) if deadline.left < np.inf else Deadline.counted(SEARCH)
-        if self.path.start.contacts > CONTACTS:
-            return None
         try:
-            found = pieces_between(self.path.at(a), self.path.at(b), search)
+            found = _pieces(self.path.at(a), self.path.at(b), search)
         except TimeUp as reason:
             self.why_not_whole = str(reason)
+            return None
+        if found is None:
             return None
         self.why_not_whole = found.doubt
         for piece in found.pieces:
             if not self._reached(a + (b - a) * piece.middle, self.path.state(piece.r)):
                 return None
+        if self.doubts or self.lost:
+            return None
+        self.undecided = tuple((a + (b - a) * p, a + (b - a) * q) for p, q in found.undecided)
         low, high = (a + (b - a) * t for t in found.interval)
-        return None if found.doubt or self.doubts or self.lost else (low, high)
+        return None if found.doubt else (low, high)
 
     def through(self, values: Sequence[float]) -> None:
         """Branches through all solutions at these values."""
+        from ..solutions.discs.search import enumerate_discs
         from ..solutions.enumerate import enumerate_solutions
 
+        listed = enumerate_discs if self.path.start.dimension == 3 else enumerate_solutions
         for k, p in enumerate(values):
             search = self.limits.deadline.share(0.5 / (len(values) - k))
-            found = enumerate_solutions(self.path.at(p), time_limit=search)
+            found = listed(self.path.at(p), time_limit=search)
             if not found.complete:
                 self.doubts.append(f"at {p:g}: {found.reason}")
             for solution in found.solutions:
@@ -207,7 +219,7 @@ class _Drawn:
             doubts.append(f"{len(self.sets)} sets of solutions are no curves")
         return Diagram(
             tuple(self.branches), at, not doubts, "; ".join(doubts) or self._why(at, whole),
-            tuple(self.lost), tuple(self.sets), now() - self.began, whole,
+            tuple(self.lost), tuple(self.sets), now() - self.began, whole, self.undecided,
         )  # fmt: skip
 
     def _why(self, at: tuple[float, ...], whole: tuple[float, float] | None) -> str:
@@ -217,11 +229,33 @@ class _Drawn:
                 "other pattern of statuses has one at any of these loads"
             )
         values = ", ".join(f"{p:g}" for p in at)
+        if 0 < sum(q - p for p, q in self.undecided) < FEW * np.ptp(self.limits.interval):
+            spans = ", ".join(f"{p:.9g} to {q:.9g}" for p, q in self.undecided[:SPANS])
+            more = len(self.undecided) - SPANS
+            return (
+                f"all solutions at {values} are on these branches, and all others but for "
+                f"values from {spans}" + (f" and {more} more" if more > 0 else "")
+                + f", where nothing is proved ({self.why_not_whole})"
+            )
         tried = f" ({self.why_not_whole})" if self.why_not_whole else ""
         return (
             f"all solutions at {values} are on these branches; nothing is proved between these "
             f"values, where a closed branch would not be seen{tried}"
         )
+
+
+def _pieces(start: FrictionProblem, end: FrictionProblem, search: Deadline) -> Pieces | None:
+    """All pieces between two problems, None where there are too many contacts to try.
+
+    Raises TimeUp where W is not there in time.
+    """
+    from ..solutions.discs.load_search import LARGEST, pieces_in_space
+    from ..solutions.enumerate import CONTACTS
+    from ..solutions.interval_search import pieces_between
+
+    if start.dimension == 2:
+        return pieces_between(start, end, search) if start.contacts <= CONTACTS else None
+    return pieces_in_space(start, end, search) if start.contacts <= LARGEST else None
 
 
 def _found_again(

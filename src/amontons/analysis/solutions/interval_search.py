@@ -12,10 +12,6 @@ closed ones included, and no other line exists.
 Patterns that only touch: one contact that changes its status has a solution on all of its
 statuses at that t, a contact at rest on both of its slips.  Theirs are solutions of a piece,
 within NEAR; what is neither that nor sure leaves a doubt.
-
-Where all of q_i of a contact vanishes at an end, as where a load grows from zero on closed
-gaps, all patterns meet: the interval begins or ends START of its length inside.  Where all of q
-does, solutions at all other loads are multiples of those at the other end.
 """
 
 from __future__ import annotations
@@ -35,53 +31,19 @@ from ..multipliers.rounding import EPSILON, gamma
 from ..scaled import Scaled
 from ..statuses import ANY, FREE, LOAD, MINUS, PLUS, States, word
 from ..tolerances import DATA, SAME
+from .load_interval import LoadInterval, Piece, Pieces, Span
 from .moving_pattern import MovingPattern
 from .pattern_leaves import NODE, Cut, leaves_of
 from .plane_problem import PlaneProblem
 
 Array = NDArray[np.float64]
-Span = tuple[float, float]
 LEAF = 4e6  # operations of a part of a pattern that is left, besides its linear system
-START = 1e-6  # of the interval, by which ends without load are left out
 POINT = 1e-9  # share of the interval up to which a part is a point
 PARTS = 400  # of one pattern on a cell, after which it is left undecided
 LEAVES = 30  # patterns of a cell, above which it is halved
 NODES = 30_000  # partial patterns of a cell, likewise
 CELL = 1e-4  # share of the interval below which no cell is halved
 NEAR = SAME  # distance of scaled solutions that count as one, relative to the largest
-
-
-@dataclass(frozen=True, eq=False)
-class Piece:
-    """A status pattern that has a solution at every t from low to high.
-
-    pattern: as of `PieceSolution`.  r (nc, 2): reactions in the middle.
-    """
-
-    pattern: str
-    low: float
-    high: float
-    r: Array
-
-    @property
-    def middle(self) -> float:
-        """Where r is."""
-        return (self.low + self.high) / 2
-
-
-@dataclass(frozen=True, eq=False)
-class Pieces:
-    """What `pieces_between` found; doubt: empty where these are proved to be all.
-
-    interval: the t that this holds for.  touching: patterns whose solutions are those of
-    pieces within NEAR.  examined: partial patterns that were looked at.
-    """
-
-    pieces: tuple[Piece, ...]
-    interval: Span
-    touching: int
-    doubt: str
-    examined: int
 
 
 def pieces_between(start: FrictionProblem, end: FrictionProblem, deadline: Deadline) -> Pieces:
@@ -114,27 +76,13 @@ def pieces_between(start: FrictionProblem, end: FrictionProblem, deadline: Deadl
     return Pieces(pieces, family.interval, len(others), "; ".join(search.doubts), search.nodes)
 
 
-class Family:
-    """Load and friction over t, scaled by the larger unit of both ends."""
+class Family(LoadInterval):
+    """The patterns of all loads between two, for the search."""
 
     def __init__(self, a: Scaled, b: Scaled) -> None:
-        self.scaled = a if a.to_u[0] >= b.to_u[0] else b
-        self.loads = np.stack([(x.q * (x.to_u / self.scaled.to_u)).ravel() for x in (a, b)])
-        self.mus = np.stack([a.mu, b.mu])
-        self.rubs = bool((a.mu != b.mu).any())
-        size = np.abs(self.loads).max()
-        rows = np.abs(self.loads.reshape(2, -1, 2)).max(axis=2)
-        still = (rows <= DATA * size).any(axis=1)
-        self.interval = (START if still[0] else 0.0, 1.0 - START if still[1] else 1.0)
-        self.zero: NDArray[np.bool_] = np.logical_not(self.loads.any(axis=1))
+        super().__init__(a, b)
         whole = PlaneProblem(self.scaled, self.loads, self.mus.max(axis=0))
         self.shrink, self.bounded = whole.shrink, whole.box.bounded
-
-    def at(self, a: float, b: float) -> tuple[Array, Array]:
-        """(loads (2, 2 nc), coefficients (2, nc)) at both ends of a span."""
-        t = np.array([[a], [b]])
-        loads, mus = ((1 - t) * x[0] + t * x[1] for x in (self.loads, self.mus))
-        return loads, mus
 
     def leaves(
         self, span: Span, below: States | None = None, cuts: list[Cut] | None = None

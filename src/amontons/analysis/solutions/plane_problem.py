@@ -101,31 +101,11 @@ class PlaneProblem:
         """The range of G^T r, of u_N and u_T more than that, G (2 nc, 4 nc) in rows of four.
 
         Over r W r + c r <= 0, rounding included; None where W is not surely definite.
-
-        L L^T <= W, for L is the factor of W less what rounding can do to it (`rounding`).  So
-        x = L^T r lies in the ball about -p / 2 through 0, p = L^-1 c, and g r = (L^-1 g) x.
-        With X the computed L^-1 and |X L - 1| <= rho, |L^-1 g - X g| <= rho / (1 - rho) |X g|
-        in the maximum norm.
         """
-        m = len(self.W)
-        W = (self.W + self.W.T) / 2
-        shift = 4 * (m + 3) * EPSILON * np.abs(np.diag(W)).sum()
-        try:
-            L = np.linalg.cholesky(W - shift * np.eye(m))
-        except np.linalg.LinAlgError:
+        found = energy_range(self.W, self.loads, G)
+        if found is None:
             return None
-        X = solve_triangular(L, np.eye(m), lower=True)
-        off = np.abs(X @ L - np.eye(m)) + gamma(m + 2) * (np.abs(X) @ np.abs(L))
-        rho = float(off.sum(axis=1).max(initial=0.0))
-        if not rho < 0.5:
-            return None
-        H, dH = _inverted(X, G, rho)
-        p, dp = _inverted(X, self.loads.T, rho)
-        size, dsize = np.linalg.norm(H, axis=0), np.linalg.norm(dH, axis=0)
-        ball, dball = (float(np.linalg.norm(x, axis=0).max()) for x in (p, dp))
-        middle, reach = -(p.T @ H) / 2, (size + dsize) * (ball + dball) / 2
-        reach += (dsize * ball + size * dball + dsize * dball) / 2
-        reach += 8 * gamma(m + 4) * (size + dsize) * (ball + dball)
+        middle, reach = found
         start = np.zeros((len(self.loads), self.contacts, 4))
         start[:, :, 2:] = self.loads.reshape(len(self.loads), -1, 2)
         start = start.reshape(len(self.loads), -1)
@@ -234,6 +214,38 @@ class PlaneProblem:
         for k, (on_r, on_u) in enumerate(rows):
             P[k, list(on_r)], Q[k, list(on_u)] = list(on_r.values()), list(on_u.values())
         return P, Q
+
+
+def energy_range(W: Array, loads: Array, G: Array) -> tuple[Array, Array] | None:
+    """(middles (k, n), half widths) of G^T r over r W r + c r <= 0, c of loads (k, m).
+
+    G (m, n).  Rounding included; None where W is not surely definite.
+
+    L L^T <= W, for L is the factor of W less what rounding can do to it (`rounding`).  So
+    x = L^T r lies in the ball about -p / 2 through 0, p = L^-1 c, and g r = (L^-1 g) x.
+    With X the computed L^-1 and |X L - 1| <= rho, |L^-1 g - X g| <= rho / (1 - rho) |X g|
+    in the maximum norm.
+    """
+    m = len(W)
+    W = (W + W.T) / 2
+    shift = 4 * (m + 3) * EPSILON * np.abs(np.diag(W)).sum()
+    try:
+        L = np.linalg.cholesky(W - shift * np.eye(m))
+    except np.linalg.LinAlgError:
+        return None
+    X = solve_triangular(L, np.eye(m), lower=True)
+    off = np.abs(X @ L - np.eye(m)) + gamma(m + 2) * (np.abs(X) @ np.abs(L))
+    rho = float(off.sum(axis=1).max(initial=0.0))
+    if not rho < 0.5:
+        return None
+    H, dH = _inverted(X, G, rho)
+    p, dp = _inverted(X, loads.T, rho)
+    size, dsize = np.linalg.norm(H, axis=0), np.linalg.norm(dH, axis=0)
+    ball, dball = (float(np.linalg.norm(x, axis=0).max()) for x in (p, dp))
+    middle, reach = -(p.T @ H) / 2, (size + dsize) * (ball + dball) / 2
+    reach += (dsize * ball + size * dball + dsize * dball) / 2
+    reach += 8 * gamma(m + 4) * (size + dsize) * (ball + dball)
+    return middle, reach
 
 
 def _inverted(X: Array, G: Array, rho: float) -> tuple[Array, Array]:

@@ -49,16 +49,19 @@ def run(
     name = ALIASES.get(parameter, parameter)
     at: Sequence[float] = ()
     whole: tuple[float, float] | None = None
+    undecided: Sequence[tuple[float, float]] = ()
     limits: dict[str, Any] = {"max_points": max_points, "time_limit": time_limit,
                               "options": opened.settings.continuation()}  # fmt: skip
     if every:
         found = questions.diagram(target, name, (low, high), **limits)
         branches, complete, reason = list(found), found.complete, found.reason
-        at, whole = found.at, found.whole
+        at, whole, undecided = found.at, found.whole, found.undecided
     else:
         branches = [questions.follow(target, name, (low, high), **limits)]
         complete, reason = None, ""
-    text = to_json(record(branches, parameter, (low, high), complete, reason, at, whole))
+    text = to_json(
+        record(branches, parameter, (low, high), complete, reason, at, whole, undecided)
+    )
     model: Any = opened.model if opened.has_model else None
     table = csv_of(branches, [name for name in (x, y) if name is not None], model)
     figure = None
@@ -83,12 +86,13 @@ def run(
 def record(
     branches: Sequence[Branch], parameter: str, interval: tuple[float, float],
     complete: bool | None, reason: str, at: Sequence[float] = (),
-    whole: tuple[float, float] | None = None,
+    whole: tuple[float, float] | None = None, undecided: Sequence[tuple[float, float]] = (),
 ) -> dict[str, Any]:  # fmt: skip
     """What follow.json holds; points and events name their branch.
 
     complete: all solutions at the values `at` are on these branches, which says nothing of the
-    values between them; whole: the interval on which the same is proved of all values.
+    values between them; whole: the interval on which the same is proved of all values;
+    undecided: parts of it, in 3D, for which it is not, where it is of the rest.
     """
     parts = [branch.record() for branch in branches]
 
@@ -100,7 +104,8 @@ def record(
         "points": rows("points"), "events": rows("events"),
         "branches": [{"stops": part["stops"], "closed": part["closed"]} for part in parts],
         "complete": complete, "at": list(at), "whole": None if whole is None else list(whole),
-        "reason": reason, "versions": versions(),
+        "undecided": [list(span) for span in undecided], "reason": reason,
+        "versions": versions(),
     }  # fmt: skip
 
 
