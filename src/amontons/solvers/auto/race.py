@@ -16,8 +16,8 @@ believed less: its rest counts C / (GRACE F) times.  Besides
                 has had a small share of it; a method of Newton's kind what it usually needs
                 until it has cost that
     near        where the best error of all is near the goal, momentum is taken to need, until
-                it has cost that, a multiple of the whole way at the mean rate at which that error
-                was come by: another kind of sweeps costs less than Newton's method from afar
+                it has cost that, a multiple of the whole way at the mean rate at which that
+                error was come by: sweeps of another kind cost less than Newton's from afar
     first       the track at the top of the table has a few chunks before all others, and more
                 while it promises the goal for less than to let them in costs
     nothing     where no track promises anything, the one that has cost least

@@ -125,10 +125,10 @@ def interior_point(state: State) -> Chunks:
     while True:
         relaxation, done = Relaxation.of(state.work, slip, solver.shift), 0
         while done < RELAXED:
-            steps = int(np.clip(turn.cost / state.step_cost, 1, RELAXED - done))
+            steps = int(np.clip(turn.cost / state.relaxation_cost, 1, RELAXED - done))
             count = relaxation.advance(state.goal, state.affordable(steps))
             done += count
-            cost = max(count, 1) * state.step_cost
+            cost = max(count, 1) * state.relaxation_cost
             turn = yield Chunk(relaxation.r.copy(), max(count, 1), cost)
             if count < steps:
                 break
