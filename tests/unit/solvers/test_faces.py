@@ -15,7 +15,7 @@ from amontons.solvers.newton.faces import NONE, FaceMatrix
 from amontons.solvers.newton.interior_point import Relaxation
 from amontons.solvers.newton.smoothing import Workspace
 
-POINTS = 9  # contacts of a face
+POINTS = 12  # contacts of a face
 
 
 def pile(bodies=5, seed=3):
@@ -26,9 +26,10 @@ def pile(bodies=5, seed=3):
     for i, (upper, lower) in enumerate(pairs):
         turned = np.linalg.qr(random.standard_normal((3, 3)))[0]
         frame = turned if i >= POINTS * bodies else np.eye(3)
+        place = random.uniform(-1, 1, 2)
         for body, sign in ((upper, 1.0), (lower, -1.0)):
             if body >= 0:
-                arm = np.append(0.5 * sign * -1.0, random.uniform(-1, 1, 2))
+                arm = np.append(-0.5 * sign, place)
                 for a in range(3):
                     H[6 * body : 6 * body + 6, 3 * i + a] = sign * np.append(
                         frame[a], np.cross(arm, frame[a])
@@ -72,7 +73,7 @@ def test_faces_of_a_pile_and_a_step():
     problem = problem_of(W, q)
     found = FaceMatrix.of(problem, Workspace.of(problem).symbolic)
     assert found.faces.rank.tolist() == [6] * 5
-    assert (found.faces.face[-2:] == -1).all() or (found.faces.face >= 0).all()
+    assert (found.faces.face[-2:] == -1).all()
     random = np.random.default_rng(1)
     E = random.standard_normal((len(q), 3, 3))
     E = E @ E.transpose(0, 2, 1) * 10.0 ** random.uniform(-4, 2, (len(q), 1, 1))
@@ -87,7 +88,7 @@ def test_faces_of_a_pile_and_a_step():
 
 
 def test_relaxation_is_the_same_with_faces():
-    """Reactions are not unique, the motion and the steps are."""
+    """Reactions are not unique, the motion is."""
     problem = problem_of(*pile())
     ends = []
     for known in (True, False):
@@ -95,10 +96,11 @@ def test_relaxation_is_the_same_with_faces():
         if not known:
             work.__dict__["sharing"] = FaceMatrix(NONE, work.symbolic)
         relaxation = Relaxation.of(work, np.full(problem.contacts, 0.1), 1e-10)
-        ends.append((relaxation.advance(0.0, 60), problem.velocity(relaxation.r)[0]))
+        while not relaxation.ended:
+            relaxation.advance(0.0, 60)
+        ends.append(problem.velocity(relaxation.r)[0])
     assert work.sharing.faces is NONE
-    assert abs(ends[0][0] - ends[1][0]) <= 3
-    assert np.abs(ends[0][1] - ends[1][1]).max() <= 1e-5 * problem.q_norm
+    assert np.abs(ends[0] - ends[1]).max() <= 1e-5 * problem.q_norm
 
 
 @pytest.mark.parametrize("size", [1e-3, 1e-6])
