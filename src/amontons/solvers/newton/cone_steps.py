@@ -46,33 +46,6 @@ def nesterov_todd_inplace(x, y, i, beta, w, lam):
 
 
 @njit(cache=True, error_model="numpy")
-def scaled_blocks_inplace(x, y, mu, i, beta, w, lam, E, inverse):
-    """Scaling (beta, w) and lambda of contact i, and its blocks E = S^-1 D S^-1 and E^-1.
-
-    With w, D = k (2 w w^T - J), J = diag(1, -1, -1), D^-1 = (2 (J w) (J w)^T - J) / k has no
-    cancellation.  Both are zero on tangents where mu = 0.
-    """
-    k = nesterov_todd_inplace(x, y, i, beta, w, lam)
-    for a in range(3):
-        for b in range(3):
-            sign = 1.0 if (a == 0) == (b == 0) else -1.0
-            E[i, a, b] = 2.0 * k * w[i, a] * w[i, b]
-            inverse[i, a, b] = 2.0 * sign * w[i, a] * w[i, b] / k
-        E[i, a, a] += -k if a == 0 else k
-        inverse[i, a, a] += -1.0 / k if a == 0 else 1.0 / k
-    if mu == 0.0:
-        for a in range(1, 3):
-            E[i, a, 0] = E[i, 0, a] = inverse[i, a, 0] = inverse[i, 0, a] = 0.0
-            E[i, 1, a] = E[i, 2, a] = inverse[i, 1, a] = inverse[i, 2, a] = 0.0
-    else:
-        for a in range(3):
-            E[i, 0, a] *= mu
-            E[i, a, 0] *= mu
-            inverse[i, 0, a] /= mu
-            inverse[i, a, 0] /= mu
-
-
-@njit(cache=True, error_model="numpy")
 def room(x, dx, rho):
     """Largest a with x + a dx in all cones, of the contacts that can react."""
     room = math.inf
