@@ -106,6 +106,25 @@ def test_one_sliding_contact_by_hand():
     assert gradient.of_W(W_change) == pytest.approx(-q * mu / (1 - 0.4 * mu) ** 2, rel=1e-12)
 
 
+@pytest.mark.parametrize("state", [1e-9, 1.0, 1e9])
+def test_one_sided_derivatives_do_not_depend_on_the_length_of_the_direction(state):
+    """A contact that just touches beside one that slides: sides(c x) = c sides(x)."""
+    W = np.array([[2, 0.3, 0.2, 0.1], [0.3, 1.5, 0, 0.2], [0.2, 0, 1.8, -0.2],
+                  [0.1, 0.2, -0.2, 1.2]])  # fmt: skip
+    r = 1 / 1.8 / (1 - 0.2 * -0.4 / 1.8 * -1) * np.array([1.0, -0.4])  # u_N = 0, it slips
+    load = np.array([[-(W[0, 2:] @ r), 0.5], [-(W[2, 2:] @ r), 1.0]]) * state
+    found = am.solve(am.FrictionProblem.from_delassus(W, load, [0.3, 0.4]), tolerance=1e-13)
+    direction = np.array([[-1.0, 0.3], [0.2, -0.1]])
+    wanted = None
+    for length in (1e-12, 1.0, 1e12):
+        change = found.jvp(load=length * state * direction)
+        (side,) = change.sides
+        assert change.complete and len(change.weak) == 1
+        wanted = side.r / length if wanted is None else wanted
+        np.testing.assert_allclose(side.r / length, wanted, rtol=1e-7, atol=1e-9 * state)
+    assert wanted[0, 0] > 0.1 * state
+
+
 def test_weak_contacts_have_all_one_sided_derivatives():
     """A contact that grazes opens one way and closes the other; a word says so."""
     W = np.eye(2)

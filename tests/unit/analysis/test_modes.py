@@ -57,6 +57,34 @@ def test_its_divergence():
     assert (found == pytest.approx([root])) if root > 0 else not len(found)
 
 
+@pytest.mark.parametrize("seed", [2, 10])
+def test_the_first_flutter_friction_where_three_modes_take_part(seed):
+    """Three contacts that give way: against the first friction at which s^2 is complex."""
+    rng = np.random.default_rng(seed)
+    A, B = rng.normal(size=(2, 6, 6))
+    K, M = A @ A.T + 0.3 * np.eye(6), np.eye(6) + 0.1 * B @ B.T
+    H, soft = np.linalg.qr(rng.normal(size=(6, 6)))[0], rng.uniform(0.02, 0.5, 3)
+    slip = np.array([[0.0, 1e3], [0.0, -1e3], [0.0, 1e3]])
+    problem = am.FrictionProblem.from_global(
+        K, H, -5 * H[:, ::2].sum(axis=1), slip, am.Compliant(am.Coulomb([0.05] * 3), soft)
+    )
+    found = am.modes(am.solve(problem, tolerance=1e-12), 6, mass=M)
+    against = H[:, 1::2] * -np.sign(slip[:, 1])
+
+    def grows(mu):
+        forces = (H[:, ::2] + mu * against) / soft
+        squares = np.linalg.eigvals(np.linalg.solve(M, K + forces @ H[:, ::2].T))
+        return (np.abs(squares.imag) > 1e-7 * np.abs(squares).max()).any()
+
+    frictions = np.linspace(0.0, 5.0, 1001)
+    first = next(k for k, mu in enumerate(frictions) if grows(mu))
+    low, high = frictions[first - 1], frictions[first]
+    for _ in range(30):
+        middle = 0.5 * (low + high)
+        low, high = (low, middle) if grows(middle) else (middle, high)
+    assert found.flutter()[0].mu == pytest.approx(high, rel=1e-6)
+
+
 def test_damping_by_hand():
     """C = a M shifts all s by -a / 2: s^2 + a s + w^2 = 0."""
     plain, damped = on_a_belt(0.1), on_a_belt(0.1, 0.2 * np.eye(2))

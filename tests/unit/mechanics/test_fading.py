@@ -90,6 +90,32 @@ def test_the_tangent_of_what_fades_is_exact(dim, more):
         assert checked_tangents(replace(problem, play=play), draws) >= 2
 
 
+def sliver(width):
+    """(problem, v) at rest but for noise, where facets face the master by a strip alone."""
+    model, rng = overhanging(3), np.random.default_rng(7)
+    parts, u = shifted(model, 0.55 - width)  # one row of facets has a strip over the edge
+    u[:, :2] += 1e-8 * rng.standard_normal((len(u), 2))  # in a plane no edges coincide
+    u[:, 2] += 0.01 * rng.standard_normal(len(u))
+    start = u.ravel()
+    fixed = np.ones(parts.X.size, dtype=bool)
+    fixed[parts.free] = False
+    before = start + 0.004 * rng.standard_normal(len(start))
+    problem = large_step(model, np.zeros(len(start)), np.where(fixed, start, 0.0), before)
+    return problem, start[parts.free]
+
+
+@pytest.mark.parametrize("width", [1e-3, 1e-7])
+def test_slivers_leave_the_residual_exact(width):
+    """Forces on others by averages over a strip, told to rounding over its width squared."""
+    problem, v = sliver(width)
+    meeting = problem.contact_point(v).meeting.parts[0]
+    assert 0 < (meeting.weights[meeting.met] / problem.parts.contact.pairs[0].areas[
+        meeting.met]).min() < 2 * width  # fmt: skip
+    rng = np.random.default_rng(1)
+    near = [problem.residual(v + 1e-15 * rng.standard_normal(len(v))) for _ in range(4)]
+    assert np.ptp(near, axis=0).max() < 1e-11 * np.abs(near).max()
+
+
 def round_end(cells, name, *, up):
     """A block with a round end at the origin, above or below."""
     mesh = am.box((1.0,) * 3, cells)

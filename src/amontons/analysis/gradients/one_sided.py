@@ -8,6 +8,7 @@ way, one each.
 from __future__ import annotations
 
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -42,7 +43,11 @@ def sides_of(
     falls = rate < 0
     if (falls & (law.coefficient == 0)).any():
         return (), False, "friction falls below zero along this direction"
-    part = min(1.0, float((law.coefficient[falls] / -rate[falls]).min(initial=2.0)) / 2)
+    most = float((law.coefficient[falls] / -rate[falls]).min(initial=np.inf)) / 2
+    try:
+        part = min(most, _part(solution, F, h, rate))
+    except AmontonsError as reason:
+        return (), False, f"one-sided derivatives were not found: {reason}"
     changes: dict = {"law": type(law)(law.coefficient + part * rate)}
     if F is not None:
         changes |= {"f": problem.f + part * F, "w": problem.w + part * h}
@@ -61,6 +66,25 @@ def sides_of(
     if found.complete and not sides:
         reason = "no solution leaves that way: it ends here, at a fold or by a jump"
     return sides, found.complete, reason
+
+
+def _part(solution: FrictionSolution, F: Array | None, h: Array, rate: Array) -> float:
+    """How far along the direction data change by as much as carries the state.
+
+    The list is that of a cone: it must not depend on how long the direction is given.
+    """
+    problem: Any = solution.problem
+    root = np.sqrt(np.where(problem.rho > 0, problem.rho, 0.0))[:, None]
+    change = h if F is None else h + (problem.H.T @ problem.solve_M(F)).reshape(h.shape)
+    carried = float(np.linalg.norm(solution.r / np.where(root > 0, root, 1.0)))
+    if carried == 0.0:
+        carried = float(np.linalg.norm(root * solution.u)) or 1.0
+    usual = float(problem.law.coefficient.max(initial=0.0))
+    if usual == 0.0:  # Coulomb's is a number, a bound a force
+        bounded = isinstance(problem.law, Tresca)
+        usual = (float(np.abs(solution.r).max(initial=0.0)) if bounded else 0.0) or 1.0
+    grows = max(float(np.linalg.norm(root * change)) / carried, np.abs(rate).max() / usual)
+    return 1.0 / grows if grows > 0 else 1.0
 
 
 def _reach(path: FrictionPath, at: Linearised) -> float:

@@ -20,7 +20,8 @@ from ...core.clock import NEVER, Deadline, now
 from ...core.errors import InvertedCells, NotConverged
 from ...mechanics.contact.current import BACK, Pieces
 from ...mechanics.model.large_deformation import LargeDeformation
-from ...mechanics.model.moved_pairs import Linearisation, PairLinearisation
+from ...mechanics.model.moved_pairs import PairLinearisation
+from ...mechanics.model.obstacle_linearisation import Linearisation
 from ...problem.law.states import OPEN, SLIP, STICK
 from ...problem.settling import settle
 from ...problem.solution import ContactStatus, FrictionSolution, Outcome

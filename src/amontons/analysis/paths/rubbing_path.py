@@ -85,15 +85,13 @@ class RubbingPath(LargePath):
 
     def by_parameter(self, here: Linear, pieces: Pieces | None) -> Array:
         """See `LargePath`."""
-        point, parts = here.point, self.step.parts
+        point = here.point
         pieces = point.pieces if pieces is None else pieces
         rough, smooth = (
             replace(point, contact=replace(point.contact, law=law)).residual(pieces)
             for law in self._laws
         )
-        out = np.zeros(parts.X.size)
-        out[parts.at] = rough - smooth
-        return out[parts.free]
+        return here.with_law(rough - smooth)
 
 
 def rubbing_path(model: Model) -> RubbingPath:

@@ -9,9 +9,12 @@ l [[M, 0], [0, 0]] is singular for modes.  Two of them meet where, with the bord
 g = 0 and dg/dl = 0 ([G]): two equations for l and p, solved by Newton's method on the whole
 sparse system; all derivatives of g come from solves with the same matrix and its transpose.
 Starts: the modes of p = 0, phi_i with forces rho_i, couple by P_ij = phi_i^T F_1 rho_j; each
-pair meets where the discriminant of its two by two problem is zero, a quadratic in p.  Newton's
-method on the smaller problem of all these modes improves them first.  A point is kept if the
-modes of the whole grow beyond it and not before.
+pair meets where the discriminant of its two by two problem is zero, a quadratic in p.  Where
+three modes take part that is far off, so that the small problem diag(l_i) - p P of all these
+modes is also followed over p: where more of its eigenvalues are complex than before, two have
+met.  Steps are divided where slopes tell that two would meet and part again within them.
+Newton's method on the small problem improves all starts.  A point is kept if the modes of the
+whole grow beyond it and not before.
 
 Divergence, l = 0, is an eigenvalue problem in p.  Damping shifts both; then `modes` tells.
 
@@ -25,7 +28,7 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy import sparse
+from scipy import linalg, sparse
 
 from ...core.errors import SingularOperator
 from .modes import modes_of
@@ -39,6 +42,10 @@ CHECKED = 1e-3  # relative distance before and beyond a point at which modes are
 SAME = 1e-7
 LARGEST = 1e3  # friction beyond which nothing is looked for
 AHEAD = 1.2  # of the last point that is wanted: starts up to there are tried, too
+LEAST = 1e-4  # friction from which on the small problem is followed
+WALK = 280  # steps of that to LARGEST, in equal ratios
+HALVINGS = 8  # of such a step
+NARROWED = 14  # halvings around a point where modes meet, before Newton's method
 
 
 @dataclass(frozen=True)
@@ -118,6 +125,7 @@ def _starts(state: SlidingState, count: int) -> list[tuple[float, float]]:
                 if abs(p.imag) <= 1e-2 * abs(p) and 0 < p.real < LARGEST / state.mu:
                     x = 0.5 * (l[i] + l[j] - p.real * (P[i, i] + P[j, j]))
                     out.append((float(x), float(p.real)))
+    out += _followed(l, P, LEAST / state.mu, LARGEST / state.mu)
     dense = _Small(np.diag(l), P)
     better = [dense.newton(*start) for start in out]
     out = [b if b is not None else a for a, b in zip(out, better, strict=True)]
@@ -126,6 +134,60 @@ def _starts(state: SlidingState, count: int) -> list[tuple[float, float]]:
         if x > 0 and p > 0 and all(abs(p - q) > 1e-6 * q for _, q in unique):
             unique.append((x, p))
     return unique[: 4 * MODES]
+
+
+class _Spectrum:
+    """Eigenvalues of diag(l) - p P: real ones (k,), ascending, their slopes; complex pairs."""
+
+    def __init__(self, l: Array, P: Array, p: float) -> None:
+        self.p = p
+        found: Any = linalg.eig(np.diag(l) - p * P, left=True, right=True)
+        values, left, right = found
+        real = np.flatnonzero(values.imag == 0.0)
+        real = real[np.argsort(values.real[real], kind="stable")]
+        self.pairs = values[values.imag > 0]
+        self.real = values.real[real]
+        y, x = left.real[:, real], right.real[:, real]
+        size = np.einsum("nk,nk->k", y, x)
+        size = np.where(np.abs(size) > 1e-300, size, 1e-300)
+        self.slope = -np.einsum("nk,nk->k", y, P @ x) / size
+
+    def may_meet(self, p: float) -> bool:
+        """Whether two neighbours, with squared distances linear in p, meet before p."""
+        gap, rate = np.diff(self.real), np.diff(self.slope)
+        return bool((gap + 2 * rate * (p - self.p) < 0).any())
+
+
+def _followed(l: Array, P: Array, least: float, largest: float) -> list[tuple[float, float]]:
+    """(l, p) at which eigenvalues of diag(l) - p P meet and leave the real axis."""
+    out = []
+    places = np.geomspace(least, largest, WALK + 1)
+    last = _Spectrum(l, P, 0.0)
+    for place in places:
+        ahead = [(_Spectrum(l, P, float(place)), 0)]
+        while ahead:
+            there, depth = ahead[-1]
+            more = len(there.pairs) - len(last.pairs)
+            unclear = more > 1 or (
+                more <= 0 and (last.may_meet(there.p) or there.may_meet(last.p))
+            )
+            if unclear and depth < HALVINGS:
+                ahead[-1] = there, depth + 1
+                ahead.append((_Spectrum(l, P, 0.5 * (last.p + there.p)), depth + 1))
+                continue
+            if more > 0:
+                before, after = last, there
+                for _ in range(NARROWED):
+                    between = _Spectrum(l, P, 0.5 * (before.p + after.p))
+                    if len(between.pairs) > len(last.pairs):
+                        after = between
+                    else:
+                        before = between
+                new = after.pairs[np.argmin(after.pairs.imag)]
+                out.append((float(new.real), after.p))
+            last = there
+            ahead.pop()
+    return out
 
 
 @dataclass(frozen=True, eq=False)

@@ -41,9 +41,10 @@ from ...solvers.newton.states import PlainStates
 from ..contact.current import STICK, ContactPoint, Pieces
 from ..contact.current_pairs import Meetings
 from ..elements.linear_body import LinearBody
-from .moved_pairs import Linearisation, PairLinearisation, balanced, turned_forces
+from .moved_pairs import PairLinearisation, balanced, balanced_law
 from .nodal_forces import NodalForces, nodal_forces
 from .nonlinear_parts import NonlinearParts, nonlinear_parts
+from .obstacle_linearisation import Linearisation, turned_forces
 from .places_of_failure import places_of_failure
 from .pressure_states import PressureStates
 
@@ -135,14 +136,15 @@ class LargeDeformation(NonlinearProblem):
         motion = meeting.motion(u, self.before.reshape(u.shape), self.earlier)
         return motion + self.drift, meeting
 
-    def _point(self, u: Array, rest: Array) -> tuple[ContactPoint, Array]:
-        """The law at displacements u (nodes, d), where the bodies need `rest` (dofs,).
+    def _point(
+        self, u: Array, needed: Array, pieces: Pieces | None = None
+    ) -> tuple[ContactPoint, Array]:
+        """The law at displacements u (nodes, d), where the bodies need `needed` (dofs,).
 
-        And these without what contacts give to other nodes.
+        And these without what contacts give to other nodes, by the active or given pieces.
         """
-        (motion, meeting), contact = self._meeting(u), self.parts.contact
-        rest = balanced(self.parts, meeting, rest)
-        return contact.at(rest[self.parts.at], motion, meeting, self.drawn, self.play), rest
+        known = *self._meeting(u), self.drawn, self.play
+        return balanced_law(self.parts, needed, known, pieces)
 
     def _needed(self, u: Array, pressures: Array | None = None) -> Array:
         """f_int - f (dofs,) at displacements u (nodes, d), or at given pressures, too."""
@@ -172,7 +174,7 @@ class LargeDeformation(NonlinearProblem):
         is not defined.
         """
         u = self.displacement(v)
-        point, rest = self._point(u, self._needed(u, pressures))
+        point, rest = self._point(u, self._needed(u, pressures), pieces)
         rest[self.parts.at] = point.residual(pieces)
         return rest[self.parts.free]
 
@@ -184,14 +186,12 @@ class LargeDeformation(NonlinearProblem):
         self, v: Array, pieces: Pieces | None = None, pressures: Array | None = None
     ) -> Linearisation | PairLinearisation:
         """F and its derivatives at a state; pressures as in `residual`."""
-        u = self.displacement(v)
+        parts, u = self.parts, self.displacement(v)
         needed, blocks = self._needed_slopes(u, pressures)
-        point, rest = self._point(u, needed)
+        point, rest = self._point(u, needed, pieces)
         if not point.meeting.only_obstacles:
-            return PairLinearisation(
-                self.parts, u, needed, rest, blocks, point, self.earlier, point.partials(pieces)
-            )
-        return Linearisation(self.parts, u, rest, blocks, point, *point.derivatives(pieces))
+            return PairLinearisation(parts, u, rest, blocks, point, self.earlier, pieces)
+        return Linearisation(parts, u, rest, blocks, point, *point.derivatives(pieces))
 
     def pieces(self, v: Array) -> Pieces:
         """The active piece of the law at every contact, see `ContactPoint.pieces`."""

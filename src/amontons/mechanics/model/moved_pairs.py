@@ -16,10 +16,22 @@ with O the part of (1) that contacts of nodes that meet give to others, in globa
 
 No two pairs are slave and master of each other, along none of their chains, so that C O is
 nilpotent: (I + C O)^-1 = I - C O + (C O)^2 - ..., with as many terms as the chain has pairs.
+
+Nodes of which hardly anything faces the master, `contact.fading`, have averages B that are
+extrapolations from a sliver of width d: these change by 1 / d and are told to eps / d^2 only.
+What the law gives such a node is next to nothing, but lambda, which its body asks for, may be
+anything away from a solution.  With the weight w_p of (2) there and law_p, (2) of
+`contact.current`, other nodes get
+
+    lambda_p - (1 - w_p) law_p                                                              (3)
+
+in the place of lambda_p in (1): the same where F = 0, and else, as w goes to zero, the force of
+the law itself, which does so, too, with the part that faces the master.
 """
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import dataclass
 from functools import cached_property
 from typing import Any
@@ -31,7 +43,7 @@ from scipy import sparse
 from ...linear.condensed import Structure
 from ...linear.sums import among, by_components, in_rows, sum_of_products
 from ..contact.carried import TiedMeeting
-from ..contact.current import ContactPoint, Partials
+from ..contact.current import ContactPoint, Partials, Pieces
 from ..contact.current_mortar import MortarMeeting
 from ..contact.current_pairs import AnyMeeting, Meeting, Meetings
 from ..contact.current_slopes import blocks_of
@@ -42,29 +54,60 @@ from .tangent_structure import structure_of
 Array = NDArray[np.float64]
 
 
-def balanced(parts: NonlinearParts, meeting: Meetings, rest: Array) -> Array:
+def balanced(
+    parts: NonlinearParts, meeting: Meetings, needed: Array, less: Array | None = None
+) -> Array:
     """f_int - f (dofs,) without the forces that contacts give to nodes other than the slave.
 
-    At slaves it is C times that.
+    At slaves it is C times that.  less (nc, d): what (3) takes off lambda.
     """
     if meeting.only_obstacles:
-        return rest
-    own = _own(parts, meeting, rest)
-    out = rest - meeting.given(own)
+        return needed
+    own = parts.gathers @ needed
+    if parts.chained:
+        others = _others(parts, meeting)
+        if less is not None:
+            own = own + parts.gathers @ (others @ less.ravel())
+        own = _unchained(parts, others, own)
+    own = own.reshape(parts.at.shape) * _carried(parts, meeting)
+    out = needed - meeting.given(own if less is None else own - less)
     out[parts.at] = (parts.gathers @ out).reshape(parts.at.shape)
     return out
 
 
-def _own(parts: NonlinearParts, meeting: Meetings, needed: Array) -> Array:
-    """lambda (nc, d) of nodes that meet, of f_int - f (dofs,)."""
-    gathered = parts.gathers @ needed
-    if parts.chained:
-        gathered = _unchained(parts, _others(parts, meeting), gathered)
-    return gathered.reshape(parts.at.shape) * parts.contact.free * meeting.met[:, None]
+def _carried(parts: NonlinearParts, meeting: Meetings) -> Array:
+    """1 for components of forces that contacts take, (nc, d), 0 for the others."""
+    return (parts.contact.free & meeting.met[:, None]).astype(np.float64)
+
+
+def balanced_law(
+    parts: NonlinearParts, needed: Array,
+    known: tuple[Array, Meetings, Array | None, Array | None], pieces: Pieces | None = None,
+) -> tuple[ContactPoint, Array]:  # fmt: skip
+    """The law, and `balanced`, with (3) by the active or given pieces.
+
+    known: s, where contacts meet, drawn and play of `CurrentContact.at`.
+    """
+    rest = balanced(parts, known[1], needed)
+    point = parts.contact.at(rest[parts.at], *known)
+    if point.mixed is None:
+        return point, rest
+    for _ in range(parts.chained + 1):  # forces on the next pair of a chain follow
+        rest = balanced(parts, known[1], needed, kept_back(point, pieces))
+        point = parts.contact.at(rest[parts.at], *known)
+    return point, rest
+
+
+def kept_back(point: ContactPoint, pieces: Pieces | None = None) -> Array | None:
+    """(1 - w) law of (3), (nc, d), of the active or given pieces; None where nothing fades."""
+    if point.mixed is None:
+        return None
+    faint = 1 - point.mixed.weights
+    return faint[:, None] * point.residual(pieces) * point.contact.free
 
 
 def _unchained(parts: NonlinearParts, others: sparse.csr_array, gathered: Any) -> Any:
-    """(I + C O)^-1 of (2) times an array or matrix (nc d, ...)."""
+    """(I + C O)^-1 of (2) times an array or matrix (nc d, ...), others (dofs, nc d): O."""
     out = term = gathered
     for _ in range(parts.chained):
         term = -(parts.gathers @ (others @ term))
@@ -74,86 +117,24 @@ def _unchained(parts: NonlinearParts, others: sparse.csr_array, gathered: Any) -
 
 def _others(parts: NonlinearParts, meeting: Meetings) -> sparse.csr_array:
     """Forces on other nodes per force on the slaves, (dofs, nc d)."""
-    counts = parts.contact.free * meeting.met[:, None]
-    return meeting.returned(counts.astype(float))
-
-
-@dataclass(frozen=True, eq=False)
-class Linearisation:
-    """F and its derivatives at one state, with obstacles alone.
-
-    u (nodes, d): displacements; rest (dofs,): f_int - f; blocks: its derivative; by_force,
-    by_x, by_motion (nc, d, d): those of the contact law.
-    """
-
-    parts: NonlinearParts
-    u: Array
-    rest: Array
-    blocks: Array
-    point: ContactPoint
-    by_force: Array
-    by_x: Array
-    by_motion: Array
-
-    @property
-    def residual(self) -> Array:
-        """F, (n,)."""
-        parts = self.parts
-        out = self.rest.copy()
-        out[parts.at] = self.point.residual()
-        return out[parts.free]
-
-    @cached_property
-    def matrix(self) -> sparse.csc_array:
-        """dF/dv, (n, n)."""
-        parts = self.parts
-        blocks = self.blocks.copy()
-        rows = np.flatnonzero(parts.row_contact >= 0)
-        blocks[rows] = self.by_force[parts.row_contact[rows]] @ blocks[rows]
-        blocks[parts.diagonal] += self.by_x + self.by_motion
-        return parts.on_free(blocks)
-
-    def shifted(
-        self, load: NodalForces | Array, prescribed: Array, drift: Array | None = None
-    ) -> Array:
-        """First-order change of F, (n,), with changes of load, prescribed (dofs,) and drift."""
-        parts = self.parts
-        change = parts.matrix(self.blocks) @ prescribed - NodalForces.of(load).at(self.u)
-        at = np.einsum("pij,pj->pi", self.by_force, change[parts.at])
-        if drift is not None:
-            at += np.einsum("pij,pj->pi", self.by_motion, drift)
-        change[parts.at] = at
-        return change[parts.free]
-
-    @property
-    def structure(self) -> Structure:
-        """What the matrix consists of."""
-        nothing = sparse.csr_array((len(self.parts.free), self.parts.at.size))
-        return structure_of(self.parts, self.u, self.by_force, nothing)
-
-    def passed(self, change: Array) -> Array:
-        """First-order change of F, (n,), with a change of f_int - f, (dofs,)."""
-        parts, out = self.parts, change.copy()
-        out[parts.at] = np.einsum("pij,pj->pi", self.by_force, change[parts.at])
-        return out[parts.free]
+    return meeting.returned(_carried(parts, meeting))
 
 
 @dataclass(frozen=True, eq=False)
 class PairLinearisation:
     """F and its derivatives at one state, displacements u (nodes, d).
 
-    needed, rest (dofs,): f_int - f, and balanced; blocks: derivative of the first in node
-    blocks; partials: of the law, see `ContactPoint.partials`.
+    rest (dofs,): f_int - f, balanced; blocks: derivative of f_int - f in node blocks; given
+    (nc,): pieces of the law, the active ones for None.
     """
 
     parts: NonlinearParts
     u: Array
-    needed: Array
     rest: Array
     blocks: Array
     point: ContactPoint
     earlier: Meetings
-    partials: Partials
+    given: Pieces | None = None
 
     @cached_property
     def residual(self) -> Array:
@@ -165,15 +146,15 @@ class PairLinearisation:
     @cached_property
     def _chained(self) -> tuple[Partials, Array, Array]:
         """Partials of the law by gap and motion themselves, and those of `fading`."""
-        mixed = self.point.mixed
+        mixed, partials = self.point.mixed, self.point.partials(self.given)
         if mixed is not None:
-            return mixed.chained(self.partials)
-        return self.partials, np.zeros(0), np.zeros(0)
+            return mixed.chained(partials)
+        return partials, np.zeros(0), np.zeros(0)
 
     @property
     def structure(self) -> Structure:
         """What the matrix consists of."""
-        returned = self._others[self.parts.free]
+        returned = self._returned[self.parts.free]
         return structure_of(self.parts, self.u, self._chained[0][0], returned)
 
     @cached_property
@@ -189,63 +170,126 @@ class PairLinearisation:
         return _others(self.parts, self.point.meeting)
 
     @cached_property
-    def _law(self) -> sparse.csr_array:
-        """Derivative of the rows of contacts by the forces on their side, (dofs, dofs)."""
+    def _faint(self) -> Array:
+        """1 - w of (3), zero for components that supports take, (nc d,)."""
+        assert self.point.mixed is not None
+        return np.ravel((1 - self.point.mixed.weights)[:, None] * self.parts.contact.free)
+
+    @cached_property
+    def _by_force(self) -> sparse.csr_array:
+        """Derivative of the law by lambda, (nc d, nc d)."""
         partials, by_share, _ = self._chained
         by_force = blocks_of(partials[0])
         if self.point.mixed is not None:
             free = self.parts.contact.free.astype(float)
             shares = by_components(self.point.meeting.shares, free)
-            by_force = by_force + blocks_of(by_share) @ shares
-        by_force = by_force @ self.parts.gathers
+            by_force = sparse.csr_array(by_force + blocks_of(by_share) @ shares)
+        return by_force
+
+    @cached_property
+    def _law(self) -> sparse.csr_array:
+        """Derivative of the rows of contacts by the forces on their side, (dofs, dofs)."""
+        by_force = self._by_force @ self.parts.gathers
         return in_rows(by_force, self.parts.at.ravel(), len(self.rest))
+
+    @cached_property
+    def _returned(self) -> sparse.csr_array:
+        """Derivative of the forces on other nodes by lambda, (dofs, nc d): O with (3)."""
+        if self.point.mixed is None:
+            return self._others
+        less = sparse.diags_array(self._faint) @ self._by_force
+        return sparse.csr_array(self._others - self._others @ less)
 
     def _left(self, needed: Any) -> Any:
         """What (1) leaves of f_int - f on all nodes, of an array or matrix (dofs, ...)."""
         own = self.parts.gathers @ needed
         if self.parts.chained:
-            own = _unchained(self.parts, self._others, own)
+            own = _unchained(self.parts, self._returned, own)
         return own
 
     def passed(self, change: Array) -> Array:
         """First-order change of F, (n,), with a change of f_int - f, (dofs,)."""
-        rest = change - self._others @ self._left(change)
+        rest = change - self._returned @ self._left(change)
         return (self._kept * rest + self._law @ rest)[self.parts.free]
 
+    def with_law(self, change: Array) -> Array:
+        """First-order change of F, (n,), with a change of the law at contacts, (nc, d)."""
+        out = np.zeros(len(self.rest))
+        out[self.parts.at] = change
+        out = out[self.parts.free]
+        if self.point.mixed is None:
+            return out
+        return out + self.passed(self._others @ (self._faint * change.ravel()))
+
     @cached_property
-    def _near(self) -> sparse.csr_array:
-        """dF/dx without the rows of `blocks` that are `_kept`, (dofs, dofs)."""
-        parts, meeting = self.parts, self.point.meeting
-        shape = len(self.rest), len(self.rest)
-        (_, by_normal, by_gap, by_motion, by_axis), by_share, by_weight = self._chained
-        force = _own(parts, meeting, self.needed)
-        stiffness = sparse.csr_array(parts.matrix(self.blocks))
-        rows, taken = [], [(-self._others, sparse.csr_array(self._left(stiffness)))]
+    def _force(self) -> Array:
+        """lambda of nodes that meet, (nc, d)."""
+        return self.rest[self.parts.at] * _carried(self.parts, self.point.meeting)
+
+    @property
+    def _each(self) -> Iterator[tuple[AnyMeeting, AnyMeeting, slice]]:
+        """Pairs now and earlier, and which contacts are theirs."""
         start = 0
-        for part, old in zip(meeting.parts, self.earlier.parts, strict=True):
+        for part, old in zip(self.point.meeting.parts, self.earlier.parts, strict=True):
             mine = slice(start, start + len(part.slaves))
             start = mine.stop
+            yield part, old, mine
+
+    @cached_property
+    def _by_place(self) -> sparse.csr_array:
+        """Derivative of the law by the place of all nodes, lambda held, (nc d, dofs)."""
+        parts, meeting, rows = self.parts, self.point.meeting, []
+        (_, by_normal, by_gap, by_motion, by_axis), by_share, by_weight = self._chained
+        for part, old, mine in self._each:
             slopes = by_normal[mine], by_gap[mine], by_motion[mine]
             if isinstance(part, MortarMeeting) and isinstance(old, MortarMeeting):
-                turned = part.slopes.pushed(force[mine])
-                taken.append((None, -turned))
-                if parts.chained:
-                    taken.append((self._others, sparse.csr_array(self._left(turned))))
                 row = _law_of_pair(part, old, *slopes)
                 if part.fading is not None:
-                    known = force[mine], by_share[mine], by_weight[mine]
+                    known = self._force[mine], by_share[mine], by_weight[mine]
                     row = sparse.csr_array(row + part.fading.slopes(*known))
                 rows.append(row)
             elif isinstance(part, TiedMeeting):
                 rows.append(_law_of_tie(part, old, *slopes))
             else:
                 rows.append(_law_at_obstacle(part, *slopes))
-        change = sum_of_products(taken, shape)  # of what is left of f_int - f
         local = rows[0] if len(rows) == 1 else sparse.csr_array(sparse.vstack(rows))
         if by_axis is not None and meeting.axes is not None:
             turned = sparse.kron(meeting.axes, sparse.eye_array(len(parts.points[0])), "csr")
             local = sparse.csr_array(local + blocks_of(by_axis) @ turned)
-        own = in_rows(local, parts.at.ravel(), len(self.rest))
+        return local
+
+    @property
+    def _turned(self) -> Iterator[sparse.csr_array]:
+        """Derivatives of the forces on other nodes by all places, lambda held, (dofs, dofs)."""
+        less, force = kept_back(self.point, self.given), self._force
+        for part, _, mine in self._each:
+            if isinstance(part, MortarMeeting):
+                yield part.slopes.pushed(force[mine] if less is None else (force - less)[mine])
+        if less is None:
+            return
+        law, rows = self.point.residual(self.given) * self.parts.contact.free, []
+        for part, _, mine in self._each:
+            fading = part.fading if isinstance(part, MortarMeeting) else None
+            if fading is None:
+                rows.append(sparse.csr_array((law[mine].size, len(self.rest))))
+            else:
+                nothing = np.zeros((*law[mine].shape, law.shape[1]))
+                rows.append(fading.slopes(force[mine], nothing, law[mine]))
+        kept = sparse.csr_array(sparse.diags_array(self._faint) @ self._by_place)
+        yield sparse.csr_array(self._others @ (sparse.csr_array(sparse.vstack(rows)) - kept))
+
+    @cached_property
+    def _near(self) -> sparse.csr_array:
+        """dF/dx without the rows of `blocks` that are `_kept`, (dofs, dofs)."""
+        parts, shape = self.parts, (len(self.rest), len(self.rest))
+        stiffness = sparse.csr_array(parts.matrix(self.blocks))
+        own = in_rows(self._by_place, parts.at.ravel(), len(self.rest))
+        taken = [(-self._returned, sparse.csr_array(self._left(stiffness)))]
+        for turned in self._turned:
+            taken.append((None, -turned))
+            if parts.chained:
+                taken.append((self._returned, sparse.csr_array(self._left(turned))))
+        change = sum_of_products(taken, shape)  # of what is left of f_int - f
         kept = sparse.csr_array(
             (change.data * np.repeat(self._kept, np.diff(change.indptr)), change.indices,
              change.indptr), shape=shape)  # fmt: skip
@@ -266,9 +310,10 @@ class PairLinearisation:
         """First-order change of F, (n,), with changes of load, prescribed (dofs,) and drift."""
         change = self._kept * (self.parts.matrix(self.blocks) @ prescribed)
         change += self._near @ prescribed
+        out = change[self.parts.free] - self.passed(NodalForces.of(load).at(self.u))
         if drift is not None:
-            change[self.parts.at] += np.einsum("pij,pj->pi", self._chained[0][3], drift)
-        return change[self.parts.free] - self.passed(NodalForces.of(load).at(self.u))
+            out += self.with_law(np.einsum("pij,pj->pi", self._chained[0][3], drift))
+        return out
 
 
 def _law_of_pair(
@@ -307,13 +352,3 @@ def _at_slaves(part: Meeting, values: Array, dofs: int) -> sparse.csr_array:
     columns = part.slaves[:, None, None] * d + np.arange(d)
     entries = (values.ravel(), (rows.ravel(), np.broadcast_to(columns, values.shape).ravel()))
     return sparse.coo_array(entries, shape=(nc * m, dofs)).tocsr()
-
-
-def turned_forces(axes: Array, r: Array, bend: Array) -> Array:
-    """Derivative of the forces sum_k r_k axis_k by the position, (nc, d, d).
-
-    dn = bend dx, and tangents are carried along: dt = -n (t . dn).
-    """
-    n, t = axes[:, 0], axes[:, 1:]
-    along = np.einsum("pk,pkc,pcj->pj", r[:, 1:], t, bend)
-    return r[:, 0, None, None] * bend - n[:, :, None] * along[:, None, :]

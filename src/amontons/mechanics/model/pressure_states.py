@@ -21,7 +21,8 @@ from scipy import sparse
 
 from ...linear.condensed import Structure
 from ...solvers.newton.states import Linear
-from .moved_pairs import Linearisation, PairLinearisation
+from .moved_pairs import PairLinearisation
+from .obstacle_linearisation import Linearisation
 
 if TYPE_CHECKING:
     from .large_deformation import LargeDeformation

@@ -122,7 +122,7 @@ def pose(rows, contacts, bodies, motion, free, restitution, keys, state):  # noq
             _turned_vector(R[b], motion[1][b], omega[b])
         before = row_velocities(slave, master, axes, arms, master_arms, motion[0], omega)
         for i in range(contacts):
-            q[i, 0] += restitution * min(before[i, 0], 0.0)
+            q[i, 0] += restitution * before[i, 0]  # also of those that part: see `moving`
     indptr, size = coupled(slave, master, count)
     indices, data = np.empty(size, np.int32), np.empty((size, 3, 3))
     diagonal = np.empty(n, np.int32)
