@@ -198,7 +198,9 @@ CONSTANTS = {
     "shares": {e.name: e.share for e in ALONE},
     "optimisms": {e.name: e.optimism for e in ALONE},
     "needs": {e.name: 1.0 for e in ALONE if e.needs is not None},
+    "near": rules.NEAR, "nears": {e.name: e.near for e in ALONE if e.near},
 }  # fmt: skip
+LAST = {e.name for e in ALONE if e.last}
 
 
 class Replay:
@@ -249,14 +251,20 @@ def simulated(row, goal, c):
     tracks = {n: Replay(f) for n, f in row["traces"].items()
               if f is not None and len(f[1]) and f[0] > goal}  # fmt: skip
     total, lead = 0.0, next(iter(row["traces"]))
+    fall = [(0.0, max((t.first for t in tracks.values()), default=1.0))]
 
-    def rest(name):
+    def rest(name, mean):
         track = tracks[name]
         if name in row["needs"]:
             needed = row["needs"][name] * c["needs"][name]
+            if name in LAST:
+                return needed if track.cost < c["shares"][name] * total else math.inf
             if track.cost < needed:
                 return needed - track.cost
         promise = track.promise(goal, c)
+        likely = c["nears"].get(name, 0.0) * mean
+        if track.cost < likely:
+            promise = min(promise, likely - track.cost)
         unknown = track.cost < c["shares"][name] * total
         return min(promise, c["optimisms"][name] * total) if unknown else promise
 
@@ -267,7 +275,8 @@ def simulated(row, goal, c):
         if lead in left and tracks[lead].at < c["first"]:
             name = lead
         else:
-            rests = {n: rest(n) for n in left}
+            mean = rules.mean_rate(fall, goal, c["near"])
+            rests = {n: rest(n, mean) for n in left}
             name = min(left, key=rests.get)
             if rests[name] == math.inf:
                 name = min(left, key=lambda n: tracks[n].cost)
@@ -275,6 +284,8 @@ def simulated(row, goal, c):
         before = track.cost
         track.at += 1
         total += track.cost - before
+        if track.error < fall[-1][1]:
+            fall.append((total, track.error))
         if track.error <= goal:
             return sum(t.seconds for t in tracks.values())
     return math.inf
@@ -299,7 +310,8 @@ def mean(values):
 GRID = {
     "window": (0.5, 0.6, 0.7, 0.8, 0.9), "first": (1, 2, 3, 4), "grace": (1.0, 1.5, 2.0, 4.0),
     "shares": (0.0, 0.02, 0.05, 0.1, 0.15, 0.2, 0.3), "optimisms": (0.1, 0.3, 1.0, 3.0, 10.0),
-    "needs": (0.3, 0.5, 0.7, 1.0, 1.5, 2.0),
+    "needs": (0.3, 0.5, 0.7, 1.0, 1.5, 2.0), "near": (1.0, 1.2, 1.5, 2.0),
+    "nears": (0.0, 1.0, 1.5, 2.0, 3.0),
 }  # fmt: skip
 
 

@@ -118,7 +118,7 @@ def restarts(state: State, stages: tuple[Stage, ...] = RESTARTS) -> Iterator[Ite
 
 TRACKS = (
     Entry("Anderson Gauss-Seidel", anderson, 0.02, 1.0),
-    Entry("momentum Gauss-Seidel", momentum, 0.1, 3.0),
+    Entry("momentum Gauss-Seidel", momentum, 0.1, 3.0, near=1.5),
     Entry("Gauss-Seidel, relaxation 1.6", partial(relaxed, 1.6), 0.02, 3.0),
     Entry("Gauss-Seidel, relaxation 0.9", partial(relaxed, 0.9), 0.02, 3.0),
     Entry("interior point", interior_point, 0.05, 1.0, _steps(20), _has_cone),

@@ -15,6 +15,9 @@ believed less: its rest counts C / (GRACE F) times.  Besides
     unknown     a track is taken to need some part, or multiple, of all that was spent while it
                 has had a small share of it; a method of Newton's kind what it usually needs
                 until it has cost that
+    near        where the best error of all is near the goal, momentum is taken to need, until
+                it has cost that, a multiple of the whole way at the mean rate at which that
+                error was come by: sweeps of another kind cost less than Newton's from afar
     first       the track at the top of the table has a few chunks before all others, and more
                 while it promises the goal for less than to let them in costs
     nothing     where no track promises anything, the one that has cost least
@@ -47,6 +50,9 @@ Array = NDArray[np.float64]
 WINDOW = 0.7  # last part of a track's cost from which its rate is told
 FIRST_CHUNKS = 3  # of the first track before its rate counts
 GRACE = 1.5  # times the cost at which a track has promised the goal: its promise is broken
+# Logarithm of the way to the goal, over that of the way to the best error, up to which that is
+# near; multiple of the best error at which it is taken to have been come by.
+NEAR, ALMOST = 1.5, 2.0
 GROWTH = 0.2  # cost of a chunk, of what its track has cost
 CALL = 3e4  # nanoseconds that a chunk costs besides: Python, a judgement, bookkeeping
 SHORTEST = 6e4  # nanoseconds of a chunk at least, or the calls cost more than the sweeps
@@ -98,8 +104,10 @@ class Entry:
 
     share: of all cost up to which it is taken to be unknown, and then to need `optimism` times
     all cost.  needs: nanoseconds that a method of Newton's kind is taken to need, whatever its
-    rate, until it has cost them; None for sweeps.  last: it runs where no other promises the
-    goal for that, and has no more than its share while another promises it at all.
+    rate, until it has cost them; None for sweeps.  near: what it is taken to need near the end,
+    in whole ways at the mean rate of the best; 0: nothing is known.  last: it runs where no
+    other promises the goal for that, and has no more than its share while another promises it
+    at all.
     """
 
     name: str
@@ -109,6 +117,7 @@ class Entry:
     needs: Callable[[State], float] | None = None
     when: Callable[[State], bool] = always
     last: bool = False
+    near: float = 0.0
 
 
 @dataclass(eq=False)
@@ -149,8 +158,11 @@ class Track:
         self.foreseen = min(self.foreseen, self.cost + self.promise)
         return chunk
 
-    def rest(self, total: float) -> float:
-        """Nanoseconds to the goal that it promises, of `total` spent on all tracks."""
+    def rest(self, total: float, mean: float = math.inf) -> float:
+        """Nanoseconds to the goal that it promises, of `total` spent on all tracks.
+
+        mean: nanoseconds of the whole way at the mean rate of the best of all.
+        """
         entry = self.entry
         if entry.needs is not None:
             needed = entry.needs(self.state)
@@ -161,6 +173,8 @@ class Track:
         promise = self.promise
         if self.cost > GRACE * self.foreseen:
             promise *= self.cost / (GRACE * self.foreseen)
+        if self.cost < entry.near * mean:
+            promise = min(promise, entry.near * mean - self.cost)
         unknown = self.cost < entry.share * total
         return min(promise, entry.optimism * total) if unknown else promise
 
@@ -211,6 +225,20 @@ class Done:
         self.stage = stage
 
 
+def mean_rate(fall: list[tuple[float, float]], goal: float, near: float = NEAR) -> float:
+    """Nanoseconds of the whole way at the mean rate of the best, infinite where it is afar.
+
+    fall: cost of all and best error, unit of u, whenever that fell, from the start on.
+    """
+    best, first = fall[-1][1], fall[0][1]
+    if not 0.0 < best < first or not goal > 0.0:
+        return math.inf
+    part = math.log(first / goal) / math.log(first / best)
+    if part > near:
+        return math.inf
+    return part * next(cost for cost, error in fall if error <= ALMOST * best)
+
+
 @dataclass(eq=False)
 class Race:
     """The tracks of one problem; the first of the table leads."""
@@ -227,6 +255,7 @@ class Race:
         self.shows_all = False  # where the driver ends what can not come to an end
         # error, total and chunks at the last progress
         self.mark = (self.state.first_error, 0.0, 0)
+        self.fall = [(0.0, self.state.first_error)]  # total and best error whenever that fell
 
     def iterates(self) -> Iterates:
         """The best reaction now and then, until nothing helps or is left.
@@ -261,6 +290,8 @@ class Race:
             return
         self.total += track.cost - before
         self.chunks += 1
+        if self.state.error < self.fall[-1][1]:
+            self.fall.append((self.total, self.state.error))
         self.done.add(chunk, track.entry.name)
         if self._is_due():
             judged = yield self._shown()
@@ -296,7 +327,8 @@ class Race:
 
     def _next(self) -> Track:
         """The track that promises the goal for the least cost."""
-        rests = [track.rest(self.total) for track in self.tracks]
+        mean = mean_rate(self.fall, self.state.goal)
+        rests = [track.rest(self.total, mean) for track in self.tracks]
         least = min(rests)
         if least < math.inf:
             return self.tracks[rests.index(least)]
