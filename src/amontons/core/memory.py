@@ -1,0 +1,20 @@
+"""What was freed goes back to the system.
+
+The C library keeps freed blocks for later ones, also when much was freed once and for all: what
+a whole mesh has needed on the process that cut it, blocks of a matrix that PETSc holds by now.
+"""
+
+from __future__ import annotations
+
+import ctypes
+import gc
+import sys
+
+
+def give_back() -> None:
+    """Let the C library return the pages that nothing lives on; nothing where it can not."""
+    gc.collect()
+    if sys.platform == "linux":
+        trim = getattr(ctypes.CDLL(None), "malloc_trim", None)  # glibc alone has it
+        if trim is not None:
+            trim(ctypes.c_size_t(0))
