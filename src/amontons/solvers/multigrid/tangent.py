@@ -107,7 +107,7 @@ class Tangent:
             _mask(sums.found, near.row_idle, near.column_idle, sums.blocks)
 
     def _put(self, k: int, found: NDArray[np.int32]) -> None:
-        """Entries of the matrix of level k with their changes, and the inverses of its blocks."""
+        """Entries of the matrix of level k with their changes, and inverses of its blocks."""
         near, A = self.truncation.near[k], self.hierarchy.levels[k].A
         assert near.places is not None
         _put(found, near.places, near.base, self.below[k], A.data)
