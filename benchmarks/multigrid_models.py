@@ -1,7 +1,8 @@
 """Models of `multigrid` whose meshes nobody chose for multigrid: pairs, and one body of a kind.
 
 Pairs are those of [PK] in linear elasticity: two blocks, a rounded die that irons a slab, and a
-half ball that presses a beam; sizes double from row to row.
+half ball that presses a beam; sizes double from row to row.  Two more are all of tetrahedra
+that a mesh generator makes anew for every size: two blocks, and a half ball on a block.
 
 [PK] S. Petrides, T. Hartland, T. Kolev et al., "AMG with filtering: an efficient preconditioner
 for interior point methods in large-scale contact mechanics optimization", arXiv:2505.18576.
@@ -52,6 +53,22 @@ def beam_and_ball(size, mu):
     supports = [am.Fix("lower.left", 0), am.Fix("lower.right", 0),
                 am.Fix("upper.top", (0.005, 0, -0.04))]  # fmt: skip
     return pair(half_ball(int(np.log2(size))), lower, supports, mu, "upper.round")
+
+
+def two_blocks_of_tets(size, mu):
+    """The two blocks in tetrahedra, without levels."""
+    lower, upper = (generated(unit_cube, edge / size) for edge in (0.2, 0.17))
+    upper = replace(upper, points=0.8 * np.array(upper.points) + [0.1, 0.1, 1.0])
+    supports = [am.Fix("lower.bottom", 0), am.Fix("upper.top", (0.01, 0, -0.02))]
+    return pair(upper, lower, supports, mu)
+
+
+def ball_on_block(size, mu):
+    """Half a ball pressed onto a block, both in tetrahedra without levels."""
+    lower = generated(unit_cube, 0.125 / size)
+    lower = replace(lower, points=np.array(lower.points) * [2, 2, 1] - [1, 1, 1])
+    supports = [am.Fix("lower.bottom", 0), am.Fix("upper.top", (0.005, 0, -0.04))]
+    return pair(generated(_half_ball, 0.2 / size), lower, supports, mu, "upper.round")
 
 
 @cache
@@ -147,7 +164,13 @@ def quadratic_tets(size):
     return pressed(am.box((1, 1, 1), cells=4 * size, kind="tet"), order=2)
 
 
-PAIRS = {"two blocks": two_blocks, "ironing": ironing, "beam and ball": beam_and_ball}
+PAIRS = {
+    "two blocks": two_blocks,
+    "ironing": ironing,
+    "beam and ball": beam_and_ball,
+    "two blocks of tetrahedra": two_blocks_of_tets,
+    "ball on a block of tetrahedra": ball_on_block,
+}
 KINDS = {
     "plate": slender,
     "flat cells": flat_cells,

@@ -367,12 +367,20 @@ def inverse_at_rest(A: Array, diagonal: Array, size: Array) -> Array:
     whole = A.reshape(len(k), 3, len(k), 3).copy()
     whole[k, :, k, :] += size[:, None, None] * ((left * dead[:, None, :]) @ right)
     whole = whole.reshape(A.shape)
-    try:
-        out: Array = np.linalg.inv(whole).astype(float, copy=False)
-    except np.linalg.LinAlgError:
-        return _pseudo_inverse(A)
-    regular = np.abs(out).max() * np.abs(whole).max() * SMALL < 1
-    return out if regular else _pseudo_inverse(A)
+    out = _inverse(whole)
+    regular = out is not None and np.abs(out).max() * np.abs(whole).max() * SMALL < 1
+    return out if out is not None and regular else _pseudo_inverse(A)
+
+
+def _inverse(A: Array) -> Array | None:
+    """A^-1 in half the time of `numpy.linalg.inv`, which solves for ones; None if singular."""
+    from scipy.linalg import lapack
+
+    factor, pivots, singular = lapack.dgetrf(A)
+    if singular:
+        return None
+    work = int(lapack.dgetri_lwork(len(A))[0].real)
+    return np.ascontiguousarray(lapack.dgetri(factor, pivots, lwork=work)[0])
 
 
 def _coarse_modes(levels: list[Level], nodes: Nodes, modes: Array | None) -> Array:

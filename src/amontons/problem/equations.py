@@ -20,7 +20,6 @@ from ..core.errors import SingularOperator, UnsupportedForm
 from ..linear.blocks import (
     BlockRows,
     block_rows,
-    inverse_norms,
     kernel_rows,
     spatial,
     velocity_inplace,
@@ -354,7 +353,7 @@ class Equations(Matrices):
         """Augmentation parameter, (nc,), unit of r / u; 0 where a contact can not react."""
         if self.form is Form.DELASSUS:
             return self.kernel_data[-1]
-        return inverse_norms(self.local_stiffness)
+        return self.contact_stiffness
 
     @cached_property
     def scales(self) -> tuple[float, float]:

@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from ..core.arrays import read_only
 from ..core.errors import UnsupportedForm
+from ..linear.blocks import inverse_norms
 from ..linear.grid_matrix import GridMatrix
 from .matrices import OPERATORS, GlobalMatrices
 from .protocol import Form, Problem
@@ -26,6 +27,11 @@ if TYPE_CHECKING:
     from .structure import Structure
 
 Array = NDArray[np.float64]
+
+
+def _resists(M: sparse.csc_array) -> bool:
+    """True where M has any stiffness."""
+    return isinstance(M, OPERATORS) or bool(M.diagonal().any())
 
 
 class Matrices(Problem):
@@ -117,10 +123,16 @@ class Matrices(Problem):
         """The diagonal of M, (n,), with what stands in for it where nothing deforms."""
         return self.matrices.diagonal * self._unit_stiffness
 
+    @property
+    def contact_stiffness(self) -> Array:
+        """1 / |`local_stiffness`|, (nc,), unit of r / u; 0 where a contact can not react."""
+        blocks = self.matrices.local_stiffness
+        return self._shared.once(inverse_norms, (blocks,), blocks) * self._unit_stiffness
+
     @cached_property
     def _unit_stiffness(self) -> float:
         """1, or load by motion where M is 0 and has no stiffness to compare with."""
-        if self.M is None or isinstance(self.M, OPERATORS) or self.M.diagonal().any():
+        if self.M is None or self._shared.once(_resists, (self.M,), self.M):
             return 1.0
         load, size = self.scales
         return load / size if load > 0 and size > 0 else 1.0

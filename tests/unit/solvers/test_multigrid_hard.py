@@ -16,6 +16,7 @@ from amontons.solvers.driver import drive
 from amontons.solvers.multigrid.cycles import _Run
 from amontons.solvers.multigrid.levels import ContactLevels
 from amontons.solvers.multigrid.nodes import CLOSED
+from amontons.solvers.multigrid.tangent import Tangent
 
 
 def die(size):
@@ -125,7 +126,7 @@ def cycles_at(problem, count):
     """The state of contact multigrid after some cycles: run, values at nodes."""
     levels = ContactLevels.of(problem)
     options = am.ContactMultigrid(nested=False)
-    run = _Run(levels, levels.truncation.tangent(), options, levels.finest(problem), 0)
+    run = _Run(levels, Tangent(levels.truncation), options, levels.finest(problem), 0)
     x = levels.start(problem, Iterate(np.zeros((problem.contacts, problem.dimension))))
     for _ in zip(range(count), run.cycles(x), strict=False):
         pass
@@ -160,11 +161,20 @@ def test_slip_ends_where_it_would_turn_round(monkeypatch):
 def test_a_tangent_renewed_in_parts_is_the_tangent(monkeypatch):
     """Only what has changed is multiplied, and the sum of it is what the states ask for."""
     run, _ = cycles_at(judged_by_residual(die(1).assemble(), monkeypatch), 6)
-    assert run.updates >= 3 and run.change is not None
-    truncation = run.levels.truncation
-    at_once = truncation.tangent()
-    truncation.install(at_once, 0, run.change)
-    assert len(at_once.levels) > 1
-    for one, parts in zip(at_once.levels[1:], run.tangent.levels[1:], strict=True):
+    assert run.updates >= 3
+    parts = run.tangent
+    at_once = Tangent(run.levels.truncation)
+    at_once.begin(0, run.contacts)
+    at_once.renew(*parts.parts, turned=0.0)
+    assert len(at_once.hierarchy.levels) > 1
+    pairs = zip(at_once.hierarchy.levels[1:], parts.hierarchy.levels[1:], strict=True)
+    for one, other in pairs:
         size = np.abs(one.A.data).max()
-        np.testing.assert_allclose(parts.A.data, one.A.data, atol=1e-12 * size, rtol=0)
+        np.testing.assert_allclose(other.A.data, one.A.data, atol=1e-12 * size, rtol=0)
+        size = np.abs(one.A.inverse).max()
+        np.testing.assert_allclose(other.A.inverse, one.A.inverse, atol=1e-9 * size, rtol=0)
+    parts.begin(0, run.contacts)  # and all of it is forgotten for the next contacts
+    for plain, other in zip(
+        run.levels.hierarchy.levels[1:], parts.hierarchy.levels[1:], strict=True
+    ):
+        np.testing.assert_array_equal(other.A.stored().data, plain.A.stored().data)

@@ -26,13 +26,13 @@ from numpy.typing import NDArray
 
 from ...core.errors import SingularOperator
 from ...linear.blocks import spatial
-from ...linear.hierarchy import Hierarchy
 from ...problem.law.law import TRESCA
 from ...problem.law.states import ContactStatus
 from ...solvers.contract import Breakdown
 from ...solvers.driven import driven_directions
 from ...solvers.multigrid.levels import ContactLevels
 from ...solvers.multigrid.nodes import CLOSED, ContactNodes
+from ...solvers.multigrid.tangent import Tangent
 from .linearised import Linearised
 from .systems import SINGULAR, Adjoint, Change, GlobalSystem, System
 
@@ -176,9 +176,9 @@ class _Cycle:
         self.finest = levels.hierarchy.levels[0]
         self.held = np.zeros(self.finest.A.nodes, dtype=bool)
         self.held[self.node] = True
-        self.tangent: Hierarchy = levels.truncation.tangent()
-        self.change = levels.truncation.change(0, contacts, trial, test, L)
-        levels.truncation.install(self.tangent, 0, self.change)
+        self.tangent = Tangent(levels.truncation)
+        self.tangent.begin(0, contacts)
+        self.tangent.renew(trial, test, L, turned=0.0)
         rows = self.finest.A.rows(self.node)
         own = np.linalg.inv(rows.inverse)
         block = np.einsum("cab,cad,cde->cbe", test, own, trial) + L
@@ -199,11 +199,12 @@ class _Cycle:
         """What one cycle makes of zero for A x = b: coarse levels first, then a smoother."""
         P = self.finest.P
         if P is None:
-            return self.levels.truncation.solve(0, self.change, b)
-        z, coarse = np.zeros_like(b), self.tangent.levels[1].work
+            return self.tangent.solve(b)
+        z, levels = np.zeros_like(b), self.tangent.hierarchy
+        coarse = levels.levels[1].work
         self.work[:] = b
         P.restrict(self.work, coarse.b)
-        self.tangent.cycle(1, coarse.b, coarse.x)
+        levels.cycle(1, coarse.b, coarse.x)
         P.add(coarse.x, z)
         self._relax(b, z)
         own = z[self.node].copy()

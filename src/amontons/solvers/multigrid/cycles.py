@@ -48,7 +48,6 @@ from numpy.typing import NDArray
 from ...core.arrays import read_only
 from ...core.errors import UnsupportedForm
 from ...core.options import check_options
-from ...linear.hierarchy import Hierarchy
 from ...linear.vectors import add_scaled, copy_into, dot, norm
 from ...problem.friction import Form, FrictionProblem
 from ..anderson import Anderson
@@ -64,6 +63,7 @@ from ..contract import (
 from ..least_residual import LeastResidual
 from .levels import ContactLevels
 from .nodes import ContactNodes
+from .tangent import Tangent
 
 Array = NDArray[np.float64]
 MANY = 0.1  # share of contacts that change their state above which mixing begins anew
@@ -117,11 +117,11 @@ class ContactMultigrid:
     def _iterates(
         self, problem: FrictionProblem, levels: ContactLevels, start: Iterate, target: Target
     ) -> Iterates:
-        tangent = levels.truncation.tangent()
-        run = _Run(levels, tangent, self, levels.finest(problem), 0)
+        tangent = Tangent(levels.truncation)
         x = levels.start(problem, start)
         if self.nested and start.v is None:
             self._nested_start(levels, tangent, problem, x)
+        run = _Run(levels, tangent, self, levels.finest(problem), 0)
         run.goal, own = CLOSE * target.tolerance, []
         for error in run.cycles(x):
             own.append(error)
@@ -144,7 +144,7 @@ class ContactMultigrid:
                 run.goal = CLOSE * error * share
 
     def _nested_start(
-        self, levels: ContactLevels, tangent: Hierarchy, problem: FrictionProblem, x: Array
+        self, levels: ContactLevels, tangent: Tangent, problem: FrictionProblem, x: Array
     ) -> None:
         """Add to x what the coarser levels find, from the coarsest one up."""
         coarse = levels.coarse_problems(problem, x)
@@ -171,13 +171,13 @@ class ContactMultigrid:
 class _Run:
     """Cycles on level k as the finest one, for given contacts, load (nodes, 3) and scales.
 
-    tangent: the levels of this solve, which the runs of its nested start use before.
+    tangent: that of this solve, which the runs of its nested start use before.
     """
 
     def __init__(
         self,
         levels: ContactLevels,
-        tangent: Hierarchy,
+        tangent: Tangent,
         options: ContactMultigrid,
         given: tuple[ContactNodes, Array, float, float],
         k: int,
@@ -187,8 +187,8 @@ class _Run:
         self.level = levels.hierarchy.levels[k]
         self.held = np.zeros(self.level.A.nodes, dtype=bool)
         self.held[self.contacts.node] = True
-        self.change: Array | None = None  # of the tangent on this level
-        self.below: dict[int, Array] = {}  # and on the coarser ones
+        tangent.begin(k, self.contacts)
+        self.parts = self.contacts.tangent()  # V, W, L at the present states
         self.states = np.full_like(self.contacts.state, -2)  # of the tangent
         self.frozen = False  # are the bounds of friction, in the tangent?
         self.updates = 0
@@ -215,6 +215,7 @@ class _Run:
                 self.contacts.relax(self.f, x, self.held, backward=False)
             self.level.A.residual(x, self.f, self.r)
             error = self.error(x)
+            self.parts = self.contacts.tangent()
             unsettled = self.changed() > MANY * len(self.contacts.node)
             if unsettled:
                 mixing.forget()
@@ -256,13 +257,13 @@ class _Run:
         """
         contacts, node, r = self.contacts, self.contacts.node, self.r
         raw, before, state = r[node], x[node], contacts.state.copy()
-        contacts.combine(contacts.tangent()[1], r)
+        contacts.combine(self.parts[1], r)
         if mixing.mix(x.reshape(-1), r.reshape(-1)):
             contacts.sweep(self.f, x)
             contacts.residual(self.f, x, r)
             mixed = self.error(x)
             if mixed <= error:
-                error = mixed
+                error, self.parts = mixed, contacts.tangent()
             else:
                 mixing.undo(x.reshape(-1), r.reshape(-1))
                 mixing.forget()
@@ -270,7 +271,7 @@ class _Run:
                 contacts.residual(self.f, x, r)
                 self.error(x)
             raw = r[node]
-            contacts.combine(contacts.tangent()[1], r)
+            contacts.combine(self.parts[1], r)
         mixing.keep(x.reshape(-1), r.reshape(-1))
         r[node] = raw
         return error
@@ -285,34 +286,26 @@ class _Run:
         return max(balance / self.load, law / self.length)
 
     def renew(self, frozen: bool) -> None:
-        """The tangent at the present states on all coarser levels, for frozen bounds or not.
-
-        Only what has changed since the last one is multiplied: not contacts that still stick.
-        """
+        """The tangent at the present states on all coarser levels, for frozen bounds or not."""
         self.frozen = frozen
-        contacts, truncation = self.contacts, self.levels.truncation
-        contacts = contacts.frozen() if frozen else contacts
-        before = self.change
-        self.change = truncation.change(self.k, contacts, *contacts.tangent())
-        more = self.change if before is None else self.change - before
-        truncation.install(self.tangent, self.k, more, self.below)
+        self.tangent.renew(*(self.contacts.frozen().tangent() if frozen else self.parts))
         self.states = self.contacts.state.copy()
         self.updates += 1
 
     def correct(self, x: Array, contacts: ContactNodes | None = None) -> None:
         """x += V P (one V-cycle) on the rows of the tangent; exactly on the coarsest level."""
-        contacts = contacts or self.contacts
-        V, W, _ = contacts.tangent()  # the slip of now, or the solution would not rest
+        V, W, _ = self.parts if contacts is None else contacts.tangent()
+        contacts = contacts or self.contacts  # the slip of now, or the solution would not rest
         contacts.combine(W, self.r)
         P = self.level.P
         before = x[contacts.node]
         if P is None:
-            assert self.change is not None
-            x += self.levels.truncation.solve(self.k, self.change, self.r)
+            x += self.tangent.solve(self.r)
         else:
-            coarse = self.tangent.levels[self.k + 1].work
+            levels = self.tangent.hierarchy
+            coarse = levels.levels[self.k + 1].work
             P.restrict(self.r, coarse.b)
-            self.tangent.cycle(self.k + 1, coarse.b, coarse.x, twice=True)
+            levels.cycle(self.k + 1, coarse.b, coarse.x, twice=True)
             P.add(coarse.x, x)
         contacts.limit(V, before, x)
 

@@ -29,6 +29,7 @@ moves nothing and is the friction that the law gives for u.
 from __future__ import annotations
 
 from dataclasses import dataclass, field, replace
+from functools import cached_property
 from typing import Any
 
 import numpy as np
@@ -99,9 +100,7 @@ class ContactNodes:
         return cls(node, H, inverse, compliance, back, 1 / size,
                    (rows.indptr, rows.indices, rows.data), near)  # fmt: skip
 
-    def at(
-        self, chosen: NDArray[np.bool_], node: Index, A: LevelMatrix
-    ) -> ContactNodes:
+    def at(self, chosen: NDArray[np.bool_], node: Index, A: LevelMatrix) -> ContactNodes:
         """Some of the contacts at nodes (k,) of another level."""
         return ContactNodes.at_nodes(node, self.H[chosen], A)
 
@@ -116,9 +115,7 @@ class ContactNodes:
         return replace(self, w=w, law=law, rho=rho, driven=driven, compliance=compliance)
 
     @classmethod
-    def of(
-        cls, basis: OneSided, nodes: Nodes, A: LevelMatrix
-    ) -> ContactNodes | None:
+    def of(cls, basis: OneSided, nodes: Nodes, A: LevelMatrix) -> ContactNodes | None:
         """From the one-sided basis; None where a contact is spread over several nodes."""
         nc, d = basis.dofs.shape
         held = basis.dofs == HELD
@@ -166,10 +163,15 @@ class ContactNodes:
             self.rho, self.driven, x, residual, self.r, self.u,
         )  # fmt: skip
 
+    @cached_property
+    def stiffness(self) -> Array:
+        """Size of the node's own one, (nc,), unit of A."""
+        return 1 / np.abs(self.inverse).max(axis=(1, 2), initial=np.finfo(float).tiny)
+
     def tangent(self) -> tuple[Array, Array, Array]:
         """V, W and L, each (nc, 3, 3), at the present states."""
         V, W, L = (np.empty_like(self.H) for _ in range(3))
-        size = STIFF / np.abs(self.inverse).max(axis=(1, 2))
+        size = STIFF * self.stiffness
         _tangent(self.H, self.law.kind, self.law.parameters, self.r, self.u, self.state, size,
                  V, W, L)  # fmt: skip
         return V, W, L
