@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from ...core.clock import Deadline
 from ...core.errors import InvalidInput
 from .continuation import Continuation
 from .friction_path import FrictionPath
@@ -37,7 +38,8 @@ def checked_limits(limits: Mapping[str, Any]) -> dict[str, Any]:
         number = is_number(value) and not np.isnan(value)
         if name == "max_points" and not number:
             raise InvalidInput(f"max_points: expected a number of points, got {value!r}")
-        if name == "time_limit" and not (value is None or number):
+        limit = number or value is None or isinstance(value, Deadline)
+        if name == "time_limit" and not limit:
             raise InvalidInput(f"time_limit: expected seconds, got {value!r}")
         if name == "callback" and not (value is None or callable(value)):
             raise InvalidInput(

@@ -24,6 +24,7 @@ from ...core.faces import Shown
 from ...core.files import write_bytes
 from ..tolerances import SAME
 from .continuation import Continuation
+from .events import Stop
 from .following import Limits, follow_path, track_both
 from .friction_path import FrictionPath
 from .path import Branch, EventKind, same, timed
@@ -39,6 +40,8 @@ Array = NDArray[np.float64]
 SEARCH = 20.0  # seconds' work on the whole interval where no time is given
 FEW = 0.5  # of the interval: undecided parts that are less are told in words
 SPANS = 3  # of them
+# ends of branches that hold some of a piece only, so that its middle does not stand for it
+CUT = (Stop.MAX_POINTS, Stop.TIME_LIMIT, Stop.STOPPED, Stop.STEP_TOO_SMALL, Stop.LOST)
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -127,8 +130,8 @@ def bifurcation_diagram(
 
     at: values of the parameter at which all solutions are searched for with
     `enumerate_solutions` or, in 3D, `enumerate_discs`, which at each has half of its share of
-    the time.  Without them the
-    whole interval, and both ends and the middle where that is not proved.
+    the time.  Without them the whole interval, and both ends and the middle where that is not
+    proved.
     options: those of step-by-step continuation, also where the curves are straight.
     """
     if not isinstance(path, FrictionPath):
@@ -176,7 +179,11 @@ class _Drawn:
         for piece in found.pieces:
             if not self._reached(a + (b - a) * piece.middle, self.path.state(piece.r)):
                 return None
-        if self.doubts or self.lost:
+        cut = {stop for branch in self.branches for stop in branch.stops if stop in CUT}
+        if cut and not self.why_not_whole:
+            names = sorted(stop.name.lower().replace("_", " ") for stop in cut)
+            self.why_not_whole = f"branches were not followed to their ends: {', '.join(names)}"
+        if self.doubts or self.lost or cut:
             return None
         self.undecided = tuple((a + (b - a) * p, a + (b - a) * q) for p, q in found.undecided)
         low, high = (a + (b - a) * t for t in found.interval)
@@ -190,7 +197,8 @@ class _Drawn:
         listed = enumerate_discs if self.path.start.dimension == 3 else enumerate_solutions
         for k, p in enumerate(values):
             search = self.limits.deadline.share(0.5 / (len(values) - k))
-            found = listed(self.path.at(p), time_limit=search)
+            # without a limit the search has its own: in 3D it may not end
+            found = listed(self.path.at(p), time_limit=search if search.left < np.inf else None)
             if not found.complete:
                 self.doubts.append(f"at {p:g}: {found.reason}")
             for solution in found.solutions:
@@ -229,7 +237,8 @@ class _Drawn:
                 "other pattern of statuses has one at any of these loads"
             )
         values = ", ".join(f"{p:g}" for p in at)
-        if 0 < sum(q - p for p, q in self.undecided) < FEW * np.ptp(self.limits.interval):
+        wide = sum(q - p for p, q in self.undecided)
+        if self.undecided and wide < FEW * np.ptp(self.limits.interval):
             spans = ", ".join(f"{p:.9g} to {q:.9g}" for p, q in self.undecided[:SPANS])
             more = len(self.undecided) - SPANS
             return (

@@ -10,7 +10,7 @@ from enum import Enum
 import numpy as np
 from numpy.typing import NDArray
 
-from ...core.clock import NEVER, Deadline, deadline_of, now
+from ...core.clock import NEVER, Deadline, TimeLimit, deadline_of, now
 from ...core.errors import InvalidInput, TimeUp
 from .continuation import Continuation
 from .friction_path import FrictionPath
@@ -53,7 +53,7 @@ class Limits:
 
     interval: tuple[float, float]
     max_points: int = 100_000
-    time_limit: float | None = None
+    time_limit: TimeLimit = None
     callback: Callback | None = None
     deadline: Deadline = field(default=NEVER, init=False)
 
