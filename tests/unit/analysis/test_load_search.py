@@ -130,6 +130,15 @@ def test_the_folds_of_one_contact_are_those_of_the_closed_form():
     assert min(abs((y * to_r)[0] - r) for y in states) < 1e-9
 
 
+def test_branches_that_end_early_are_not_the_whole():
+    """All pieces are proved, but the branch through the middle of one stops within it."""
+    a, b = (problem(W_ONE, [[q, Q1, Q2]], [MU]) for q in (-0.5, 0.6))
+    diagram = am.diagram(b, base=a, max_points=2)
+    assert diagram.whole is None
+    assert not diagram.undecided
+    assert "max points" in diagram.reason
+
+
 # two contacts in a plane whose curves have a loop near the middle of the interval, not at it
 PLANE = [0, 1, 3, 4]
 W_LOOP = np.eye(6)
@@ -181,11 +190,11 @@ def test_a_load_that_grows_from_zero():
 def test_what_is_undecided_is_named():
     """r_T = mu r_N with u_T = 0 all the way: stick and slip can not be told apart."""
     W, r = np.array(W_ONE), np.array([1.0, 0.3, 0.4])
-    a, b = (problem(W, [-c * (W @ r)], [0.5]) for c in (1, 2))
-    found = pieces_in_space(a, b, Deadline.counted(0.5))
+    rest, a, b = (problem(W, [-c * (W @ r)], [0.5]) for c in (0, 1, 2))
+    found = pieces_in_space(rest, b, Deadline.counted(0.2))
     assert found.doubt
-    assert found.undecided
-    diagram = am.diagram(b, base=a, time_limit=2.0)
+    assert found.undecided[0][0] == 0.0  # the end that is left out is not proved either
+    diagram = am.diagram(b, base=a, time_limit=Deadline.counted(2.0))
     assert diagram.whole is None
     assert diagram.undecided
 

@@ -46,7 +46,8 @@ class Pieces:
 
     interval: the t that this holds for.  touching: patterns whose solutions are those of
     pieces within NEAR.  examined: partial patterns, in 3D boxes, that were looked at.
-    undecided: in 3D the spans of t outside of which the pieces are all; all of it in 2D.
+    undecided: in 3D, with a doubt, the spans of t outside of which the pieces are all; in 2D
+    always empty, as a doubt is one about all t.
     """
 
     pieces: tuple[Piece, ...]

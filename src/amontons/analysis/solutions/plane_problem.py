@@ -217,9 +217,10 @@ class PlaneProblem:
 
 
 def energy_range(W: Array, loads: Array, G: Array) -> tuple[Array, Array] | None:
-    """(middles (k, n), half widths) of G^T r over r W r + c r <= 0, c of loads (k, m).
+    """(middles (k, n), half width (n,)) of G^T r over r W r + c r <= 0, c of loads (k, m).
 
-    G (m, n).  Rounding included; None where W is not surely definite.
+    G (m, n).  For all loads between these the middles are between theirs and the half width
+    holds.  Rounding included; None where W is not surely definite.
 
     L L^T <= W, for L is the factor of W less what rounding can do to it (`rounding`).  So
     x = L^T r lies in the ball about -p / 2 through 0, p = L^-1 c, and g r = (L^-1 g) x.

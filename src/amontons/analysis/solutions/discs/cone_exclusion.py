@@ -30,6 +30,7 @@ import math
 import numpy as np
 
 from ....core.compiled import njit
+from ....core.copies import copy_inplace
 from ...statuses import ANY, FREE, FRICTIONLESS, SLIP, STICK
 
 EPSILON = float(np.finfo(float).eps)
@@ -38,13 +39,6 @@ STEPS = 60  # rays taken up, after which nothing is known
 DEPENDENT = 1e-12  # pivot of Cholesky's factor, relative, of rays that depend on each other
 ALIKE = 1e-3  # loads, or rays of one arc, that are no further apart are tried as one
 HALF_CIRCLE = math.pi / 2  # half an arc from which u_T may point anywhere
-
-
-@njit(cache=True)
-def copy_inplace(out, x):
-    """out = x, for vectors."""
-    for i in range(len(x)):
-        out[i] = x[i]
 
 
 @njit(cache=True)
@@ -80,7 +74,7 @@ def _admissible_inplace(y, states, arcs):
 
 @njit(cache=True)
 def _deficits(W, y, states, arcs, mus, fastest):
-    """(largest d with y W r >= -d sum r_N, bound of y u), rounding included."""
+    """(d with y W r >= -d sum r_N, bound of y u), rounding included."""
     nc = len(states)
     lack = motion = 0.0
     for i in range(nc):
@@ -104,22 +98,26 @@ def _deficits(W, y, states, arcs, mus, fastest):
                 pushed = mu * _most_on_arc(g[1], g[2], arcs[0, i], arcs[1, i])
             else:
                 pushed = mu * math.hypot(g[1], g[2])
-            error = 4 * EPSILON * (3 * nc + 8) * (size[0] + mu * (size[1] + size[2]))
+            error = 4 * EPSILON * (3 * nc + 8) * (size[0] + mus[2, i] * (size[1] + size[2]))
             lack = max(lack, pushed - g[0] + error)
     return lack, motion
 
 
 @njit(cache=True)
 def excludes(W, y, states, arcs, mus, loads, most, fastest):
-    """True where y proves that there is no solution; most: R, fastest (nc,): bound of |u_T|."""
+    """True where y (3 nc,) proves that there is no solution.
+
+    most: R, fastest (nc,): bound of |u_T|; all else as in `exclude`.
+    """
     lack, motion = _deficits(W, y, states, arcs, mus, fastest)
     least, size = np.inf, 0.0
+    for k in range(len(y)):
+        size += abs(y[k]) * loads[2, k]
     for side in range(2):
-        value = total = 0.0
+        value = 0.0
         for k in range(len(y)):
             value += y[k] * loads[side, k]
-            total += abs(y[k] * loads[side, k])
-        least, size = min(least, value), max(size, total)
+        least = min(least, value)
     return least > (lack * most + motion + 4 * EPSILON * (len(y) + 8) * size) * (1 + 1e-12)
 
 
@@ -194,8 +192,8 @@ def _most_violated_inplace(W, left, states, arcs, mus, loads, most, column, ray)
             value = _along(trial, left)
             if value > best:
                 best, kind = value, i + (nc if part == 2 else 0)
-                copy_inplace(column, trial)
-                copy_inplace(ray, own)
+                copy_inplace(trial, column)
+                copy_inplace(own, ray)
     apart = size = 0.0
     for k in range(m):
         apart += (loads[1, k] - loads[0, k]) ** 2
@@ -213,7 +211,7 @@ def _most_violated_inplace(W, left, states, arcs, mus, loads, most, column, ray)
         value = _along(trial, left)
         if value > best:
             best, kind = value, 2 * nc
-            copy_inplace(column, trial)
+            copy_inplace(trial, column)
     return best, kind
 
 
@@ -271,8 +269,8 @@ def _shortened_inplace(A, x, s, count, kinds, rays):
         if s[j] <= 0.0 and value <= 1e-14:
             continue
         x[kept], kinds[kept] = value, kinds[j]
-        copy_inplace(A[kept], A[j])
-        copy_inplace(rays[kept], rays[j])
+        copy_inplace(A[j], A[kept])
+        copy_inplace(rays[j], rays[kept])
         kept += 1
     return kept
 
@@ -281,7 +279,9 @@ def _shortened_inplace(A, x, s, count, kinds, rays):
 def exclude(W, states, arcs, mus, loads, most, fastest, y, guess):  # noqa: PLR0913
     """True where there is surely no solution; y (3 nc,): why.
 
-    arcs (2, nc): middle and half, mus (2, nc): least and most, loads (2, 3 nc).
+    W (3 nc, 3 nc), states (nc,), arcs (2, nc): middle and half, mus (3, nc): least and most,
+    loads (3, 3 nc): at both ends; behind them the sizes of the terms of either, to which its
+    rounding is relative.  most: bound of sum r_N, fastest (nc,): of |u_T|.
     guess (nc, 6): else (r, u) near which one may be.
     """
     nc, m = len(states), len(W)
@@ -306,8 +306,8 @@ def exclude(W, states, arcs, mus, loads, most, fastest, y, guess):  # noqa: PLR0
         )
         if value <= ENTERS or count == m + 4:
             break
-        copy_inplace(A[count], column)
-        copy_inplace(rays[count], ray)
+        copy_inplace(column, A[count])
+        copy_inplace(ray, rays[count])
         kinds[count], x[count] = kind, 0.0
         count += 1
         fine = False

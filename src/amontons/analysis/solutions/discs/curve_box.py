@@ -24,6 +24,7 @@ from numpy.typing import NDArray
 
 from .curve_equations import (
     EPSILON,
+    UP,
     Local,
     Mask,
     Pattern,
@@ -38,7 +39,6 @@ Index = NDArray[np.int64]
 NEWTON = 10  # steps to the centre
 FAR = 4.0  # times the box, and what the curve moves in it, that these may go
 END = 1e-13  # of the last one, relative to 1 + |x|
-UP = 1 + 1e-12  # rounding of bounds
 CUT = 0.9  # of a width: a range that leaves more changes nothing
 
 
@@ -93,24 +93,23 @@ def _preconditioner(at: Local, k: Index) -> tuple[Array, Array, Mask]:
 def _change(pattern: Pattern, at: Local, by: Spread, P: Array, k: Index) -> Array:
     """Bounds of |P J - (1, -d)| over boxes, (B, n, n + 1), columns in the order of x."""
     n, each = at.J.shape[1], np.arange(len(k))
-    change = np.abs(P @ at.V[:, pattern.rows]) @ by.dC + np.abs(P) @ by.across
-    change += 4 * EPSILON * (n + 4) * (np.abs(P) @ np.abs(at.J))
     off = P @ at.J
     off[each[:, None], np.arange(n), _others(n, k)] -= 1.0
     off[each, :, k] = 0.0  # d is what column k gives
-    return change + np.abs(off)
+    return pattern.change(P, at, by) + np.abs(off)
 
 
 def _breaks_a_sign(pattern: Pattern, at: Local, by: Spread, half: Array) -> Mask:
     """Where an inequality of the pattern surely fails in all of a box."""
     free, A, B = 3 * pattern.free, pattern.A, pattern.B
-    fails = (at.u[:, free] + by.du[:, free] < 0).any(axis=1)
+    du = by.du + at.rounding
+    fails = (at.u[:, free] + du[:, free] < 0).any(axis=1)
     ny = pattern.ny
     normal = at.x[:, :ny] + half[:, :ny]
     fails |= (normal[:, pattern.pressed] < 0).any(axis=1)
     c, s = bend(half[:, pattern.turn])
-    most = at.u[:, A] + by.du[:, A] + c * (np.abs(at.u[:, A]) + by.du[:, A])
-    fails |= (most + s * (np.abs(at.u[:, B]) + by.du[:, B]) < 0).any(axis=1)
+    most = at.u[:, A] + du[:, A] + c * (np.abs(at.u[:, A]) + du[:, A])
+    fails |= (most + s * (np.abs(at.u[:, B]) + du[:, B]) < 0).any(axis=1)
     k, mu = pattern.first, pattern.stick_mu
     friction = np.abs(mu[0] + at.x[:, -1:] * mu[1]) + np.abs(mu[1]) * half[:, -1:]
     least = np.hypot(at.x[:, k + 1], at.x[:, k + 2])
@@ -233,12 +232,14 @@ def _slacks(
     """s_0, s_1 and bounds, (B, s, 3), of the inequalities of a pattern along its tubes."""
     x, far = at.x, np.abs(d) * h[:, None] + z
     slope = (at.Cu @ d[:, :, None])[:, :, 0]
-    bound = (np.abs(at.Cu) @ z[:, :, None] + by.dU @ far[:, :, None])[:, :, 0] + at.rounding
+    bound = (np.abs(at.Cu) @ z[:, :, None])[:, :, 0] + at.rounding
+    bound += ((by.dU + at.rounding_of_Cu) @ far[:, :, None])[:, :, 0]
     free, A, B, turn = 3 * pattern.free, pattern.A, pattern.B, pattern.turn
     out = [(at.u[:, free], slope[:, free], bound[:, free])]
     pressed = np.concatenate([pattern.pressed, pattern.first])
     out.append((x[:, pressed], d[:, pressed], z[:, pressed]))
     more = (by.along @ far[:, :, None])[:, :, 0] + np.abs(at.u[:, B]) * z[:, turn]
+    more += at.rounding[:, B] * far[:, turn]
     out.append((at.u[:, A], slope[:, A] + at.u[:, B] * d[:, turn], bound[:, A] + more))
     k, mu, t = pattern.first, pattern.stick_mu, slice(-1, None)
     m, T = mu[0] + x[:, t] * mu[1], np.hypot(x[:, k + 1], x[:, k + 2])

@@ -18,6 +18,7 @@ All is done for a stack of boxes at a time, the first axis of every array.
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 from typing import Any
 
 import numpy as np
@@ -31,6 +32,7 @@ EPSILON = float(np.finfo(float).eps)
 WIDENED = 1.05  # a bound that is tried, in what the last step gave
 TURNS = 12  # steps towards such a bound
 REGULAR = 1e13  # largest entry of an inverse
+UP = 1 + 1e-12  # rounding of sums of bounds
 
 
 def inverses(A: Array) -> tuple[Array, Mask]:
@@ -53,7 +55,7 @@ def fixed_point(D: Array, b: Array) -> tuple[Array, Mask]:
     """(e, where b + D e < e, so that |x| <= e for every |x| <= b + D |x|)."""
     e, out, fine = b, np.zeros_like(b), np.zeros(len(b), dtype=bool)
     for step in range(TURNS):
-        trial = b + (D @ e[:, :, None])[:, :, 0]
+        trial = (b + (D @ e[:, :, None])[:, :, 0]) * UP
         less = (trial < e).all(axis=1) & (step > 0)
         new = less & ~fine
         out[new], fine = e[new], fine | less
@@ -69,12 +71,19 @@ def bend(half: Array) -> tuple[Array, Array]:
     return 2 * np.sin(np.minimum(half, np.pi) / 2) ** 2, np.sin(np.minimum(half, np.pi / 2))
 
 
+def _mixed(x: Array) -> Array:
+    """Sizes of x (B, m, k); tangents of a contact have those of both, which turning mixes."""
+    sizes = np.abs(x).reshape(len(x), x.shape[1] // 3, 3, x.shape[2])
+    sizes[:, :, 1:] = sizes[:, :, 1:].sum(axis=2, keepdims=True)
+    return sizes.reshape(x.shape)
+
+
 @dataclass(frozen=True, eq=False)
 class Local:
     """At the centres of boxes: V, p (B, m, 2) turned, x (B, n + 1), r, u (B, m), F (B, n).
 
-    Cr, Cu (B, m, n + 1): derivatives of r and u; J (B, n, n + 1): those of F.  rounding (B, m):
-    of u.
+    Cr, Cu (B, m, n + 1): derivatives of r and u; J (B, n, n + 1): those of F.  rounding (B, m),
+    rounding_of_Cu (B, m, n + 1): bounds of what u and Cu are off by, turning included.
     """
 
     V: Array
@@ -87,19 +96,23 @@ class Local:
     Cu: Array
     J: Array
 
-    @property
+    @cached_property
     def rounding(self) -> Array:
-        """Bound of the rounding of u, that of turned tangents included."""
-        m = self.u.shape[1]
+        """See the class."""
+        terms = np.abs(self.V) @ _mixed(self.r[:, :, None])
+        terms[:, :, 0] += np.abs(self.p[:, :, 0]) + np.abs(self.x[:, -1:] * self.p[:, :, 1])
+        return self._relative * _mixed(terms)[:, :, 0]
 
-        def mixed(x: Array) -> Array:  # turning mixes both tangents
-            x = np.abs(x).reshape(len(x), -1, 3).copy()
-            x[:, :, 1:] = x[:, :, 1:].sum(axis=2, keepdims=True)
-            return x.reshape(len(x), m)
+    @cached_property
+    def rounding_of_Cu(self) -> Array:
+        """See the class: terms cancel, so that the size of Cu says little."""
+        terms = np.abs(self.V) @ _mixed(self.Cr)
+        terms[:, :, -1] += np.abs(self.p[:, :, 1])
+        return self._relative * _mixed(terms)
 
-        terms = (np.abs(self.V) @ mixed(self.r)[:, :, None])[:, :, 0]
-        terms += np.abs(self.p[:, :, 0]) + np.abs(self.x[:, -1:] * self.p[:, :, 1])
-        return 4 * EPSILON * (m + 16) * mixed(terms)
+    @property
+    def _relative(self) -> float:
+        return 4 * EPSILON * (self.u.shape[1] + 16)
 
 
 @dataclass(frozen=True, eq=False)
@@ -201,8 +214,7 @@ class Pattern:
         fixed = half.copy()
         fixed[:, :ny] = 0.0
         by = self.spread(at, fixed)  # F is linear in y: about y_c all that matters
-        change = np.abs(X @ at.V[:, self.rows]) @ by.dC + np.abs(X) @ by.across
-        change += 4 * EPSILON * (self.n + 4) * (np.abs(X) @ np.abs(at.J))
+        change = self.change(X, at, by)
         off = X @ at.J
         D = change[:, :, :ny] + np.abs(off[:, :, :ny] - np.eye(ny))
         b = (D @ np.abs(at.x[:, :ny, None]))[:, :, 0] if few else np.zeros((len(X), ny))
@@ -222,6 +234,13 @@ class Pattern:
             other, also = self.range_of_y(at, half, few=False)
             dy, fine = np.where(fine[:, None], dy, other), fine | also
         return dy, fine
+
+    def change(self, X: Array, at: Local, by: Spread) -> Array:
+        """Bounds (B, k, n + 1) of |X J - X J_c| over boxes, X (B, k, n), rounding included."""
+        size = np.abs(at.J) + by.dU[:, self.rows]
+        more = by.across + at.rounding_of_Cu[:, self.rows] + 4 * EPSILON * (self.n + 4) * size
+        more[:, self.turn, self.turn] += at.rounding[:, self.A]
+        return np.abs(X @ at.V[:, self.rows]) @ by.dC + np.abs(X) @ more
 
     def _spread_of_reactions(self, at: Local, half: Array) -> tuple[Array, Array]:
         """(bounds of |r - r_c|, of the change of its derivatives) over boxes."""

@@ -25,7 +25,7 @@ from ...tolerances import SAME
 from ..load_interval import LoadInterval, Piece, Pieces, Span
 from ..plane_problem import energy_range
 from .curve_box import Boxes, Curves, narrowed, on_curve, traced
-from .curve_equations import Pattern
+from .curve_equations import EPSILON, Pattern
 from .load_tree import PARTS, leaves_inplace
 
 Array = NDArray[np.float64]
@@ -60,6 +60,9 @@ def pieces_in_space(start: FrictionProblem, end: FrictionProblem, deadline: Dead
     if loose:
         search.doubts.append(f"{len(loose)} patterns are too near to a solution to be excluded")
     undecided = joined([*search.left, *((c.t[0], c.t[2]) for c in loose)])
+    if undecided:  # ends that are left out are not proved either
+        low, high = interval.interval
+        undecided = joined([*undecided, *(x for x in ((0.0, low), (high, 1.0)) if x[0] < x[1])])
     touching = sum(not c.is_sure for c in search.curves) - len(loose)
     doubt = "; ".join(search.doubts)
     return Pieces(search.pieces(), interval.interval, touching, doubt, search.seen, undecided)
@@ -184,8 +187,9 @@ class _Search:
             self.patterns[key] = Pattern(states[0].copy(), self.W, self.q, self.mu)
         pattern = self.patterns[key]
         slip, y = pattern.slip, np.zeros((len(states), pattern.ny))
-        boxes = Boxes(np.hstack([y, middle[:, slip], span.mean(axis=1, keepdims=True)]),
-                      np.hstack([y, half[:, slip], np.diff(span) / 2]))  # fmt: skip
+        x = np.hstack([y, middle[:, slip], span.mean(axis=1, keepdims=True)])
+        wide = np.hstack([y, half[:, slip], np.diff(span) / 2])
+        boxes = Boxes(x, wide + 4 * EPSILON * (1 + np.abs(x)))  # no gaps between neighbours
         empty, narrow, k = narrowed(pattern, boxes)
         some = np.flatnonzero(~empty & (k >= 0))
         known = np.zeros(len(k), dtype=bool)
@@ -230,18 +234,22 @@ class _Search:
     def _keep(self, pattern: Pattern, box: Boxes, curves: Curves, j: int) -> None:
         """Note what is sure of a curve, and put what is open on the stack."""
         (low, high), (a, b) = curves.possible[j], curves.sure[j]
+        x, d, z, ny = curves.x[j], curves.d[j], curves.z[j], pattern.ny
+        open_parts: list[Span] = []
         if low > high:
             return
         if a < b:
             self._note(pattern, curves, j, (a, b))
-            open_parts = [part for part in ((low, min(high, a)), (max(low, b), high))
-                          if part[1] - part[0] > POINT]  # fmt: skip
+            for part in ((low, min(high, a)), (max(low, b), high)):
+                width = part[1] - part[0]
+                if width > POINT:
+                    open_parts.append(part)
+                elif width * np.abs(d).max() > NEAR:  # a steep curve: `loose` tells
+                    self._note(pattern, curves, j, part, is_sure=False)
         elif high - low <= POINT:
             self._note(pattern, curves, j, (low, high), is_sure=False)
-            open_parts = []
         else:
             open_parts = [(low, (low + high) / 2), ((low + high) / 2, high)]
-        x, d, z, ny = curves.x[j], curves.d[j], curves.z[j], pattern.ny
         for part in open_parts:
             ends = x + np.outer(part, d)
             least = np.maximum(ends.min(axis=0) - z - 1e-15, box.x - box.half)
@@ -298,7 +306,10 @@ def _alike(states: States) -> list[NDArray[np.intp]]:
 
 
 def _bounds(W: Array, loads: Array) -> tuple[float, Array] | None:
-    """(bound of sum r_N, of |u_T| of every contact) at all loads between two, or None."""
+    """(bound of sum r_N, of |u_T| of every contact (nc,)) at all loads between loads (2, 3 nc).
+
+    None where W is not surely definite.
+    """
     nc = len(W) // 3
     normal = np.zeros((len(W), 1))
     normal[::3] = 1.0

@@ -12,8 +12,9 @@ import math
 import numpy as np
 
 from ....core.compiled import njit
+from ....core.copies import copy_inplace, copy_rows_inplace
 from ...statuses import ANY, CLOSED, FREE, FRICTIONLESS, SLIP, STICK
-from .cone_exclusion import copy_inplace, exclude
+from .cone_exclusion import exclude
 
 THIRD = math.pi / 3
 PARTS = 4  # most entries that a box turns into
@@ -22,10 +23,10 @@ PARTS = 4  # most entries that a box turns into
 @njit(cache=True)
 def _push_inplace(stack, top, states, middle, half, span):
     """Put a box on the stack (states, middles, halves, spans); the new top."""
-    copy_inplace(stack[0][top], states)
-    copy_inplace(stack[1][top], middle)
-    copy_inplace(stack[2][top], half)
-    copy_inplace(stack[3][top], span)
+    copy_inplace(states, stack[0][top])
+    copy_inplace(middle, stack[1][top])
+    copy_inplace(half, stack[2][top])
+    copy_inplace(span, stack[3][top])
     return top + 1
 
 
@@ -73,11 +74,17 @@ def _decide_inplace(stack, top, states, middle, half, span, i, reacts, mu, guess
 
 @njit(cache=True)
 def _ends_inplace(q, mu, span, mus, loads, load):
-    """Fill in least and most friction of a span, the loads at its ends, and in its middle."""
+    """Fill in friction and loads of a span as `exclude` wants them, and the load in its middle.
+
+    Sizes are those of the terms: near a t at which a load or friction vanishes it is off by
+    more than its own rounding.
+    """
     for i in range(mu.shape[1]):
         a, b = mu[0, i] + span[0] * mu[1, i], mu[0, i] + span[1] * mu[1, i]
         mus[0, i], mus[1, i] = min(a, b), max(a, b)
+        mus[2, i] = abs(mu[0, i]) + abs(mu[1, i])
     for j in range(len(load)):
+        loads[2, j] = abs(q[0, j]) + abs(q[1, j])
         for side in range(2):
             loads[side, j] = q[0, j] + span[side] * q[1, j]
         load[j] = (loads[0, j] + loads[1, j]) / 2
@@ -97,15 +104,15 @@ def leaves_inplace(  # noqa: PLR0913
     nc = len(reacts)
     seen = found = 0
     y, guess, arcs = np.zeros(3 * nc), np.zeros((nc, 6)), np.zeros((2, nc))
-    mus, loads, load = np.zeros((2, nc)), np.zeros((2, 3 * nc)), np.zeros(3 * nc)
+    mus, loads, load = np.zeros((3, nc)), np.zeros((3, 3 * nc)), np.zeros(3 * nc)
     while top > 0 and seen < budget:
         if top + PARTS > len(stack[0]) or found == len(guesses):
             break
         top -= 1
         seen += 1
         states, span = stack[0][top].copy(), stack[3][top].copy()
-        copy_inplace(arcs[0], stack[1][top])
-        copy_inplace(arcs[1], stack[2][top])
+        copy_inplace(stack[1][top], arcs[0])
+        copy_inplace(stack[2][top], arcs[1])
         _ends_inplace(q, mu, span, mus, loads, load)
         if exclude(W, states, arcs, mus, loads, most, fastest, y, guess):
             continue
@@ -116,7 +123,6 @@ def leaves_inplace(  # noqa: PLR0913
             )
             continue
         _push_inplace(leaves, found, states, arcs[0], arcs[1], span)
-        for j in range(nc):
-            copy_inplace(guesses[found, j], guess[j])
+        copy_rows_inplace(guess, guesses[found])
         found += 1
     return top, seen, found
