@@ -49,11 +49,13 @@ class Frictionless:
 
 
 def without_friction(problem: FrictionProblem, deadline: Deadline) -> Frictionless | None:
-    """A solution of (1) of a problem in global form, None where steps do not come to one.
+    """(1) of a problem in global form: a solution, or the last iterate; `balance` tells.
 
-    Without one (no pressures balance the load, say) the last iterate leaves much of the
-    balance.  Raises TimeUp.
+    Where there is no solution (no pressures balance the load, say) that leaves much of the
+    balance.  None without contacts or a load f, and where a matrix is singular.  Raises TimeUp.
     """
+    if not problem.contacts:
+        return None
     program = _Program.of(problem)
     if not program.load > 0:
         return None

@@ -139,13 +139,15 @@ class Relaxation:
         return c, sparse.vstack(A, format="csr"), E, e
 
     def _decided(self, decision: Decision) -> Any:
-        """Rows that are zero where a contact or face is decided."""
+        """Rows that are zero where a contact or, with directions of slip, a face is decided."""
         kind, k = decision
         if kind is Decided.OPEN:
             return sparse.kron(self.normal[[k]], sparse.eye_array(self.columns))
-        forward, backward = self.ways if self.signed else (self.opening, self.opening)
-        row = {Decided.CLOSED: self.opening, Decided.FORWARD: backward,
-               Decided.BACKWARD: forward}[kind]  # fmt: skip
+        if kind is Decided.CLOSED:
+            row = self.opening
+        else:
+            forward, backward = self.ways
+            row = backward if kind is Decided.FORWARD else forward
         return sparse.kron(sparse.eye_array(self.rows), row[[k]])
 
     def bound(

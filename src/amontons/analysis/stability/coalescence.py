@@ -40,6 +40,7 @@ DONE = 1e-13  # relative step at which it ends
 MODES = 24  # of p = 0 whose pairs are looked at
 CHECKED = 1e-3  # relative distance before and beyond a point at which modes are looked at
 SAME = 1e-7
+EPSILON = float(np.finfo(float).eps)
 LARGEST = 1e3  # friction beyond which nothing is looked for
 AHEAD = 1.2  # of the last point that is wanted: starts up to there are tried, too
 LEAST = 1e-4  # friction from which on the small problem is followed
@@ -149,7 +150,7 @@ class _Spectrum:
         self.real = values.real[real]
         y, x = left.real[:, real], right.real[:, real]
         size = np.einsum("nk,nk->k", y, x)
-        size = np.where(np.abs(size) > 1e-300, size, 1e-300)
+        size = np.where(np.abs(size) > EPSILON, size, EPSILON)  # 0 of a double one: steep
         self.slope = -np.einsum("nk,nk->k", y, P @ x) / size
 
     def may_meet(self, p: float) -> bool:
@@ -159,7 +160,10 @@ class _Spectrum:
 
 
 def _followed(l: Array, P: Array, least: float, largest: float) -> list[tuple[float, float]]:
-    """(l, p) at which eigenvalues of diag(l) - p P meet and leave the real axis."""
+    """(l, p), p ascending, near which eigenvalues of diag(l) - p P leave the real axis.
+
+    l (k,), P (k, k); p from least to largest.
+    """
     out = []
     places = np.geomspace(least, largest, WALK + 1)
     last = _Spectrum(l, P, 0.0)
