@@ -146,6 +146,7 @@ class Relaxation:
         if kind is Decided.CLOSED:
             row = self.opening
         else:
+            assert self.signed  # else V has no columns for directions
             forward, backward = self.ways
             row = backward if kind is Decided.FORWARD else forward
         return sparse.kron(sparse.eye_array(self.rows), row[[k]])

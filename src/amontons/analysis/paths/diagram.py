@@ -51,6 +51,7 @@ class Diagram(Shown):
     complete: all solutions at every value in `at` were found, with proof, and lie on a branch.
     whole: the interval between whose ends the same is proved of every value; without it a
     closed branch, or one that turns back at both ends, that passes none of `at` is not seen.
+    There is none where a limit or a failure ends a branch early.
     lost: solutions, as (parameter, state), through which no branch could be followed; sets:
     points of connected sets of solutions at one parameter, which are no curves over it.
     undecided: in 3D, where there is no `whole`, the parts of the interval to which that is due:
