@@ -30,6 +30,7 @@ import math
 import numpy as np
 
 from ....core.compiled import njit
+from ....core.copies import copy_inplace
 from ...statuses import ANY, FREE, FRICTIONLESS, SLIP, STICK
 
 EPSILON = float(np.finfo(float).eps)
@@ -38,13 +39,6 @@ STEPS = 60  # rays taken up, after which nothing is known
 DEPENDENT = 1e-12  # pivot of Cholesky's factor, relative, of rays that depend on each other
 ALIKE = 1e-3  # loads, or rays of one arc, that are no further apart are tried as one
 HALF_CIRCLE = math.pi / 2  # half an arc from which u_T may point anywhere
-
-
-@njit(cache=True)
-def copy_inplace(out, x):
-    """out = x, for vectors."""
-    for i in range(len(x)):
-        out[i] = x[i]
 
 
 @njit(cache=True)
@@ -194,8 +188,8 @@ def _most_violated_inplace(W, left, states, arcs, mus, loads, most, column, ray)
             value = _along(trial, left)
             if value > best:
                 best, kind = value, i + (nc if part == 2 else 0)
-                copy_inplace(column, trial)
-                copy_inplace(ray, own)
+                copy_inplace(trial, column)
+                copy_inplace(own, ray)
     apart = size = 0.0
     for k in range(m):
         apart += (loads[1, k] - loads[0, k]) ** 2
@@ -213,7 +207,7 @@ def _most_violated_inplace(W, left, states, arcs, mus, loads, most, column, ray)
         value = _along(trial, left)
         if value > best:
             best, kind = value, 2 * nc
-            copy_inplace(column, trial)
+            copy_inplace(trial, column)
     return best, kind
 
 
@@ -271,8 +265,8 @@ def _shortened_inplace(A, x, s, count, kinds, rays):
         if s[j] <= 0.0 and value <= 1e-14:
             continue
         x[kept], kinds[kept] = value, kinds[j]
-        copy_inplace(A[kept], A[j])
-        copy_inplace(rays[kept], rays[j])
+        copy_inplace(A[j], A[kept])
+        copy_inplace(rays[j], rays[kept])
         kept += 1
     return kept
 
@@ -306,8 +300,8 @@ def exclude(W, states, arcs, mus, loads, most, fastest, y, guess):  # noqa: PLR0
         )
         if value <= ENTERS or count == m + 4:
             break
-        copy_inplace(A[count], column)
-        copy_inplace(rays[count], ray)
+        copy_inplace(column, A[count])
+        copy_inplace(ray, rays[count])
         kinds[count], x[count] = kind, 0.0
         count += 1
         fine = False

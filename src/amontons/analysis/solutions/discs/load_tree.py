@@ -12,8 +12,9 @@ import math
 import numpy as np
 
 from ....core.compiled import njit
+from ....core.copies import copy_inplace
 from ...statuses import ANY, CLOSED, FREE, FRICTIONLESS, SLIP, STICK
-from .cone_exclusion import copy_inplace, exclude
+from .cone_exclusion import exclude
 
 THIRD = math.pi / 3
 PARTS = 4  # most entries that a box turns into
@@ -22,10 +23,10 @@ PARTS = 4  # most entries that a box turns into
 @njit(cache=True)
 def _push_inplace(stack, top, states, middle, half, span):
     """Put a box on the stack (states, middles, halves, spans); the new top."""
-    copy_inplace(stack[0][top], states)
-    copy_inplace(stack[1][top], middle)
-    copy_inplace(stack[2][top], half)
-    copy_inplace(stack[3][top], span)
+    copy_inplace(states, stack[0][top])
+    copy_inplace(middle, stack[1][top])
+    copy_inplace(half, stack[2][top])
+    copy_inplace(span, stack[3][top])
     return top + 1
 
 
@@ -104,8 +105,8 @@ def leaves_inplace(  # noqa: PLR0913
         top -= 1
         seen += 1
         states, span = stack[0][top].copy(), stack[3][top].copy()
-        copy_inplace(arcs[0], stack[1][top])
-        copy_inplace(arcs[1], stack[2][top])
+        copy_inplace(stack[1][top], arcs[0])
+        copy_inplace(stack[2][top], arcs[1])
         _ends_inplace(q, mu, span, mus, loads, load)
         if exclude(W, states, arcs, mus, loads, most, fastest, y, guess):
             continue
@@ -117,6 +118,6 @@ def leaves_inplace(  # noqa: PLR0913
             continue
         _push_inplace(leaves, found, states, arcs[0], arcs[1], span)
         for j in range(nc):
-            copy_inplace(guesses[found, j], guess[j])
+            copy_inplace(guess[j], guesses[found, j])
         found += 1
     return top, seen, found
