@@ -31,7 +31,7 @@ def models():
 
 
 def on_levels():
-    """Bodies for multigrid: in 2D, padded, and one whose mesh comes from a file, without levels."""
+    """Bodies for multigrid: in 2D, with padding, and in 3D, without levels as from a file."""
     for dim, known in ((2, True), (3, False)):
         box = am.box((1,) * dim, cells=(8,) * dim)
         up = (0,) * (dim - 1) + (1,)

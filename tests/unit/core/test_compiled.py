@@ -1,5 +1,6 @@
 """Where kernels are kept: never in the package, and without any place only for one process."""
 
+import ast
 import os
 import subprocess
 import sys
@@ -105,6 +106,34 @@ def test_a_change_of_any_kernel_makes_a_new_folder(tmp_path, monkeypatch):
     assert compiled._digest() != before
 
 
+def taken_by_kernels(path):
+    """Names that kernels of a file take from others, with the files."""
+    tree, known = ast.parse(path.read_bytes()), {}
+    for node in tree.body:
+        if isinstance(node, ast.ImportFrom) and node.level:
+            file = path.parents[node.level - 1].joinpath(*(node.module or "").split("."))
+            file = file / "__init__.py" if file.is_dir() else file.with_suffix(".py")
+            known |= {a.asname or a.name: (file, a.name.encode()) for a in node.names}
+    for node in tree.body:
+        if isinstance(node, ast.FunctionDef) and any(
+            "njit" in ast.unparse(decorator) for decorator in node.decorator_list
+        ):
+            names = {n.id for n in ast.walk(node) if isinstance(n, ast.Name)}
+            yield from (known[name] for name in names & set(known))
+
+
+def test_what_kernels_take_from_files_without_kernels_is_in_the_digest():
+    checked = 0
+    for path in PACKAGE.rglob("*.py"):
+        for file, name in taken_by_kernels(path) if compiled.MARK in path.read_bytes() else ():
+            text = file.read_bytes()
+            if compiled.MARK not in text:
+                lines = source_digest.CONSTANT.findall(text)
+                assert any(name in line.split(b"=")[0] for line in lines), (path, name)
+                checked += 1
+    assert checked > 10
+
+
 def test_a_file_that_changed_after_its_import_is_noticed(tmp_path, monkeypatch):
     monkeypatch.setattr(source_digest, "_imported", {})
     path, read = tmp_path / "a.py", set()
@@ -124,9 +153,11 @@ def twice(x):
 
 
 @pytest.fixture
-def results(tmp_path):
-    """A function compiled for two types, and makers of caches of it in one folder."""
+def results(tmp_path, monkeypatch):
+    """Results of a function for two types, and what makes caches of it in one folder."""
     from numba.core import config
+
+    monkeypatch.setattr(source_digest, "_imported", {})  # whatever is edited meanwhile
 
     made = numba.njit(twice)
     for kind in (numba.float64, numba.int64):
