@@ -275,7 +275,7 @@ def simulated(row, goal, c):
         if lead in left and tracks[lead].at < c["first"]:
             name = lead
         else:
-            mean = rules.mean_rate(fall, goal, c["near"])
+            mean = rules.whole_way(fall, goal, c["near"])
             rests = {n: rest(n, mean) for n in left}
             name = min(left, key=rests.get)
             if rests[name] == math.inf:

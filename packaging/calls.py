@@ -30,14 +30,17 @@ def models():
             )
 
 
-def without_levels():
-    """A body whose mesh comes from a file, so that multigrid has to find its levels."""
-    box = replace(am.box((1, 1, 1), cells=(8, 8, 8)), grid=None, levels=())
-    return am.Model(
-        [am.Body(box, am.LinearElastic(young=200, poisson=0.3))],
-        supports=[am.Fix("top", (0.01, 0, -0.02))],
-        contacts=[am.Contact("bottom", am.Plane(normal=(0, 0, 1)), mu=0.5)],
-    )
+def on_levels():
+    """Bodies for multigrid: in 2D, with padding, and in 3D, without levels as from a file."""
+    for dim, known in ((2, True), (3, False)):
+        box = am.box((1,) * dim, cells=(8,) * dim)
+        up = (0,) * (dim - 1) + (1,)
+        yield am.Model(
+            [am.Body(box if known else replace(box, grid=None, levels=()),
+                     am.LinearElastic(young=200, poisson=0.3))],
+            supports=[am.Fix("top", (0.01,) * (dim - 1) + (-0.02,))],
+            contacts=[am.Contact("bottom", am.Plane(normal=up), mu=0.5)],
+        )  # fmt: skip
 
 
 def attempt(what, *arguments):
@@ -91,7 +94,8 @@ def main():
         for method in METHODS:
             attempt(method.__name__, problem, method())
         attempt("adaptive", problem, am.GaussSeidel(batch=am.Batch.ADAPTIVE))
-    attempt("levels", without_levels(), am.ContactMultigrid())
+    for model in on_levels():
+        attempt("levels", model, am.ContactMultigrid())
     for model in (*models(), *sliding()):
         attempt("model", model)
     fall(0.2)

@@ -5,7 +5,9 @@ still be imported, and where nobody may write it gives up.  Here they are kept i
 cache, or where NUMBA_CACHE_DIR says, else in a folder that goes when the process ends.
 
 Numba takes what it has kept as valid while the file of a function is the same, whatever has
-become of the functions that it calls.  So all kernels are kept under a digest of all of them.
+become of the functions that it calls.  So all kernels are kept under a digest of all of them,
+and of the constants that they may take from other files; in a process that has imported other
+files than those which the digest was made of, nothing is read or kept.
 """
 
 from __future__ import annotations
@@ -26,7 +28,7 @@ from typing import Any
 import numba
 from numba.core import config
 
-from .source_digest import PACKAGE, sources
+from .source_digest import PACKAGE, Stamp, as_imported, imported, sources
 
 MARK = b"njit("  # in every file with kernels
 ROOT = 0  # whose folders anybody may trust
@@ -34,12 +36,15 @@ STRANGE = f"numba {numba.__version__} is not one that kernels in the package can
 PATIENCE = 30 * 24 * 3600.0  # seconds after which kernels of another version may go
 Function = Callable[..., Any]
 logger = logging.getLogger(__name__)
+_read: set[Stamp] = set()  # the files of the digest, as they were when it was made
 
 
 def njit(*, cache: bool = True, **options: Any) -> Callable[[Function], Function]:
     """`numba.njit` with the same options; its results come with the package, or are kept."""
 
     def decorate(function: Function) -> Function:
+        if str(function.__module__).partition(".")[0] == __name__.partition(".")[0]:
+            imported(function.__code__.co_filename)
         kind = _kind() if cache else None
         made = numba.njit(**options)(function)
         if kind and hasattr(made, "_cache"):
@@ -141,5 +146,11 @@ def _forget_old(above: Path) -> None:
 
 
 def _digest() -> str:
-    """Sixteen letters that change with any file that holds kernels."""
-    return sources(PACKAGE, MARK)
+    """Sixteen letters that change with any file that holds kernels, and with constants."""
+    return sources(PACKAGE, MARK, _read)
+
+
+def is_current() -> bool:
+    """True where the kernels of this process are those of the sources that name its folder."""
+    _folder()
+    return as_imported(_read)

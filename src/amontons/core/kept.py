@@ -2,23 +2,28 @@
 
 from __future__ import annotations
 
+import logging
 import os
 from collections.abc import Callable, Sequence
 from contextlib import AbstractContextManager, suppress
 from copy import copy
 from functools import cached_property
 from typing import Any
+from uuid import uuid4
 
 from numba.core.caching import FunctionCache, _Cache
 from numba.core.sigutils import normalize_signature
 
 from . import clock
+from .compiled import is_current
 from .shipped import name_of, shipped
 from .spelling import spelled
 
 RECORD = os.environ.get("AMONTONS_RECORD_KERNELS", "")  # a file, see docs/startup.md
 Function = Callable[..., Any]
 InFolder = Callable[[], AbstractContextManager[None]]
+NUMBER = ".{number:d}"  # where numba puts a number into the name of a file
+logger = logging.getLogger(__name__)
 
 
 class Kept(_Cache):
@@ -47,12 +52,27 @@ class Kept(_Cache):
         found = shipped().result(name, target_context)
         if found is None and (other := shipped().that_writes_less(name)):
             found = _taking(types, shipped().result(other, target_context))
-        return self.own.load_overload(sig, target_context) if found is None else found
+        return self._from_folder(sig, target_context) if found is None else found
+
+    def _from_folder(self, sig: Any, target_context: Any) -> Any:
+        if not is_current():
+            return None
+        own = self.own
+        try:
+            return own.load_overload(sig, target_context)
+        except Exception as error:  # a file cut short by a crash, or damaged: numba reads on
+            logger.warning("%s: %s: %s; it is compiled instead", own.cache_path,
+                           self.function.__qualname__, error)  # fmt: skip
+            with suppress(OSError):
+                own.flush()
+            return None
 
     def save_overload(self, sig: Any, data: Any) -> None:
         """Keep a result where there is room for it; on a full disk it is compiled again."""
-        with suppress(OSError):
-            self.own.save_overload(sig, data)
+        if is_current():
+            with suppress(OSError):
+                _name_apart(self.own)
+                self.own.save_overload(sig, data)
 
     def enable(self) -> None:
         """Numba's switch, of which nothing here makes use."""
@@ -72,6 +92,18 @@ def _taking(types: Sequence[Any], found: Any) -> Any:
     described.argtypes = tuple(types)
     signature = found.signature.replace(args=described.argtypes)
     return found._replace(signature=signature, fndesc=described)
+
+
+def _name_apart(cache: FunctionCache) -> None:
+    """Let the next result go to a file of its own.
+
+    Numba numbers the files of a function: two processes that compile it for different types at
+    the same time could write to one, and the index then name it for the wrong types.
+    """
+    files = getattr(cache, "_cache_file", None)
+    stem, number, _ = str(getattr(files, "_data_name_pattern", "")).partition(NUMBER)
+    if files is not None and number:
+        files._data_name_pattern = f"{stem}{NUMBER}.{uuid4().hex[:16]}.nbc"
 
 
 def _record(function: Function, types: Sequence[Any]) -> None:

@@ -90,9 +90,9 @@ def _forget_product(A: Any) -> None:
 def chosen_products(comm: Any, alone: str = "rap") -> Iterator[None]:
     """Let PETSc make P' A P by A P and, in a spread matrix, rows of it by a dense one.
 
-    A P takes the room of A and more, for a while.  PETSc's ways without it need that room no
-    more, and on two processes eight times as long (353 000 unknowns of tetrahedra: 21 s, sparse
-    rows 4.8, dense ones 2.1).  A dense row has an entry for every column of P: on many
+    A P takes the room of A and more, for a while.  PETSc's ways without it save that room and
+    take ten times as long on two processes (353 000 unknowns of tetrahedra: 21 s, with sparse
+    rows of A P 4.8, dense ones 2.1).  A dense row has an entry for every column of P: on many
     processes it would be larger than their parts.  alone: PETSc's name of the way on one.
     """
     options, name = petsc().Options(), "matptap_via"

@@ -1,14 +1,19 @@
 """Where kernels are kept: never in the package, and without any place only for one process."""
 
+import ast
 import os
 import subprocess
 import sys
+from contextlib import contextmanager
 from pathlib import Path
 
+import numba
 import pytest
+from numba.core.registry import cpu_target
 
 import amontons
-from amontons.core import compiled
+from amontons.core import compiled, source_digest
+from amontons.core.kept import Kept
 
 PACKAGE = Path(amontons.__file__).parent
 CALL = """
@@ -91,10 +96,117 @@ def test_a_change_of_any_kernel_makes_a_new_folder(tmp_path, monkeypatch):
     first.write_text("@njit(cache=True)\ndef f(): g()\n")
     second.write_text("@njit(cache=True)\ndef g(): 1\n")
     before = compiled._digest()
-    (tmp_path / "c.py").write_text("no kernels here")
+    third = tmp_path / "c.py"
+    third.write_text("no kernels here")
     assert compiled._digest() == before
+    third.write_text("class Status:\n    FREE, STICK = 0, 1\n")  # which kernels may hold
+    assert compiled._digest() != before
+    third.unlink()
     second.write_text("@njit(cache=True)\ndef g(): 2\n")
     assert compiled._digest() != before
+
+
+def taken_by_kernels(path):
+    """Names that kernels of a file take from others, with the files."""
+    tree, known = ast.parse(path.read_bytes()), {}
+    for node in tree.body:
+        if isinstance(node, ast.ImportFrom) and node.level:
+            file = path.parents[node.level - 1].joinpath(*(node.module or "").split("."))
+            file = file / "__init__.py" if file.is_dir() else file.with_suffix(".py")
+            known |= {a.asname or a.name: (file, a.name.encode()) for a in node.names}
+    for node in tree.body:
+        if isinstance(node, ast.FunctionDef) and any(
+            "njit" in ast.unparse(decorator) for decorator in node.decorator_list
+        ):
+            names = {n.id for n in ast.walk(node) if isinstance(n, ast.Name)}
+            yield from (known[name] for name in names & set(known))
+
+
+def test_what_kernels_take_from_files_without_kernels_is_in_the_digest():
+    checked = 0
+    for path in PACKAGE.rglob("*.py"):
+        for file, name in taken_by_kernels(path) if compiled.MARK in path.read_bytes() else ():
+            text = file.read_bytes()
+            if compiled.MARK not in text:
+                lines = source_digest.CONSTANT.findall(text)
+                assert any(name in line.split(b"=")[0] for line in lines), (path, name)
+                checked += 1
+    assert checked > 10
+
+
+def test_a_file_that_changed_after_its_import_is_noticed(tmp_path, monkeypatch):
+    monkeypatch.setattr(source_digest, "_imported", {})
+    path, read = tmp_path / "a.py", set()
+    path.write_text("@njit(cache=True)\ndef f(): 1\n")
+    source_digest.imported(str(path))
+    source_digest.imported("<string>")  # is in no file
+    source_digest.sources(tmp_path, read=read)
+    assert source_digest.as_imported(read)
+    path.write_text("@njit(cache=True)\ndef f(): 22\n")
+    read.clear()
+    source_digest.sources(tmp_path, read=read)
+    assert not source_digest.as_imported(read)
+
+
+def twice(x):
+    return 2 * x
+
+
+@pytest.fixture
+def results(tmp_path, monkeypatch):
+    """Results of a function for two types, and what makes caches of it in one folder."""
+    from numba.core import config
+
+    monkeypatch.setattr(source_digest, "_imported", {})  # whatever is edited meanwhile
+
+    made = numba.njit(twice)
+    for kind in (numba.float64, numba.int64):
+        made.compile((kind,))
+
+    @contextmanager
+    def folder():
+        before, config.CACHE_DIR = config.CACHE_DIR, str(tmp_path)
+        yield
+        config.CACHE_DIR = before
+
+    return made.overloads, lambda: Kept(twice, folder)
+
+
+def test_two_processes_that_keep_results_at_once_have_files_of_their_own(
+    tmp_path, results, monkeypatch
+):
+    """Else the index of one could name what the other has written, for other types."""
+    for kinds, result in results[0].items():
+        cache = results[1]()
+        monkeypatch.setattr(cache.own._cache_file, "_load_index", dict)  # nothing seen so far
+        cache.save_overload(kinds, result)
+    assert len(list(tmp_path.rglob("*.nbc"))) == 2
+
+
+@pytest.mark.parametrize("suffix", ["nbi", "nbc"])
+def test_what_was_kept_and_is_damaged_is_compiled_and_kept_again(
+    tmp_path, results, suffix, caplog
+):
+    (kinds, result), *_ = results[0].items()
+    results[1]().save_overload(kinds, result)
+    (file,) = tmp_path.rglob(f"*.{suffix}")
+    file.write_bytes(b"")
+    cache = results[1]()
+    assert cache.load_overload(kinds, cpu_target.target_context) is None
+    assert "compiled instead" in caplog.text
+    cache.save_overload(kinds, result)
+    files = results[1]().own._cache_file
+    assert [files._load_data(name) for name in files._load_index().values()]
+
+
+def test_in_a_process_of_other_sources_nothing_is_read_or_kept(tmp_path, results, monkeypatch):
+    (kinds, result), *_ = results[0].items()
+    results[1]().save_overload(kinds, result)
+    monkeypatch.setattr(source_digest, "_imported", {"a.py": ("a.py", 0, 0)})
+    assert results[1]().load_overload(kinds, cpu_target.target_context) is None
+    results[1]().own.flush()
+    results[1]().save_overload(kinds, result)
+    assert not results[1]().own._cache_file._load_index()
 
 
 def test_kernels_that_nobody_uses_go_after_a_while(tmp_path):

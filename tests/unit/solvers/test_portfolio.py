@@ -9,7 +9,7 @@ import pytest
 import amontons as am
 from amontons.mechanics.ready.gallery import random_delassus
 from amontons.solvers.auto.portfolio import MOST_TURNS, RESTARTS, TRACKS, Portfolio, restarts
-from amontons.solvers.auto.race import LOST_CHUNKS, Chunk, Entry, Race, Track, mean_rate
+from amontons.solvers.auto.race import LOST_CHUNKS, Chunk, Entry, Race, Track, whole_way
 from amontons.solvers.auto.state import FEW, State, visits
 from amontons.solvers.auto.tracks import polish
 from amontons.solvers.contract import Judgement, Target
@@ -326,6 +326,6 @@ def test_first_error_is_that_of_a_given_start():
 def test_the_whole_way_is_foreseen_near_the_goal_only():
     """At the mean rate until the best error was almost there, not while it stands."""
     fall = [(0.0, 1.0), (1e6, 1e-3), (2e6, 2e-6), (5e6, 1.9e-6)]
-    assert mean_rate(fall, 1e-6) == pytest.approx(2e6 * np.log(1e6) / np.log(1 / 1.9e-6))
-    assert mean_rate(fall, 1e-12) == np.inf
-    assert mean_rate(fall[:1], 1e-6) == np.inf
+    assert whole_way(fall, 1e-6) == pytest.approx(2e6 * np.log(1e6) / np.log(1 / 1.9e-6))
+    assert whole_way(fall, 1e-12) == np.inf
+    assert whole_way(fall[:1], 1e-6) == np.inf

@@ -254,7 +254,7 @@ class _Stepping:
         those: list[Any] = [a[rows] for a in at.rows]
         return _Met(Meetings(*left), at.keys[kept], Rows(*those), at.apart, 0.0)
 
-    def _taken_back(self, rows: Rows, nc: int, R: Array, before: Any, spin: Array) -> Array:
+    def _taken_back(self, rows: Rows, nc: int, R: Array, before: Motion, spin: Array) -> Array:
         """(1 - c) u_m of the joints, (k, 3), behind nc contacts; spin (n, 3): W_f."""
         those: list[Any] = [part[nc:] for part in rows]
         joints = Rows(*those)

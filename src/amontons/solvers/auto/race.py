@@ -158,10 +158,10 @@ class Track:
         self.foreseen = min(self.foreseen, self.cost + self.promise)
         return chunk
 
-    def rest(self, total: float, mean: float = math.inf) -> float:
+    def rest(self, total: float, way: float = math.inf) -> float:
         """Nanoseconds to the goal that it promises, of `total` spent on all tracks.
 
-        mean: nanoseconds of the whole way at the mean rate of the best of all.
+        way: nanoseconds of the whole way at the mean rate of the best of all.
         """
         entry = self.entry
         if entry.needs is not None:
@@ -173,8 +173,8 @@ class Track:
         promise = self.promise
         if self.cost > GRACE * self.foreseen:
             promise *= self.cost / (GRACE * self.foreseen)
-        if self.cost < entry.near * mean:
-            promise = min(promise, entry.near * mean - self.cost)
+        if self.cost < entry.near * way:
+            promise = min(promise, entry.near * way - self.cost)
         unknown = self.cost < entry.share * total
         return min(promise, entry.optimism * total) if unknown else promise
 
@@ -225,7 +225,7 @@ class Done:
         self.stage = stage
 
 
-def mean_rate(fall: list[tuple[float, float]], goal: float, near: float = NEAR) -> float:
+def whole_way(fall: list[tuple[float, float]], goal: float, near: float = NEAR) -> float:
     """Nanoseconds of the whole way at the mean rate of the best, infinite where it is afar.
 
     fall: cost of all and best error, unit of u, whenever that fell, from the start on.
@@ -327,8 +327,8 @@ class Race:
 
     def _next(self) -> Track:
         """The track that promises the goal for the least cost."""
-        mean = mean_rate(self.fall, self.state.goal)
-        rests = [track.rest(self.total, mean) for track in self.tracks]
+        way = whole_way(self.fall, self.state.goal)
+        rests = [track.rest(self.total, way) for track in self.tracks]
         least = min(rests)
         if least < math.inf:
             return self.tracks[rests.index(least)]

@@ -294,8 +294,9 @@ class _Run:
 
     def correct(self, x: Array, contacts: ContactNodes | None = None) -> None:
         """x += V P (one V-cycle) on the rows of the tangent; exactly on the coarsest level."""
+        # V and W with the slip of now, not those of `tangent`, or the solution would not rest
         V, W, _ = self.parts if contacts is None else contacts.tangent()
-        contacts = contacts or self.contacts  # the slip of now, or the solution would not rest
+        contacts = contacts or self.contacts
         contacts.combine(W, self.r)
         P = self.level.P
         before = x[contacts.node]
