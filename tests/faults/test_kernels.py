@@ -6,13 +6,14 @@ import math
 import pytest
 from faults import Faults
 
-from amontons.core import compiled
+from amontons.core import compiled, source_digest
 
 
 @pytest.mark.parametrize("number", [errno.ENOSPC, errno.EIO, errno.EACCES])
 @pytest.mark.parametrize("call", ["open", "write", "replace", None])
 def test_a_function_that_can_not_be_kept_works(call, number, tmp_path, monkeypatch):
     monkeypatch.setattr(compiled, "_folder", lambda: str(tmp_path))
+    monkeypatch.setattr(source_digest, "_imported", {})  # no digest was made of what tests use
 
     @compiled.njit(cache=True)
     def twice(x):
