@@ -41,7 +41,7 @@ class Branching:
         try:
             yield from self._solved((), 0.0)
             while self.nodes:
-                value, _, decided, answer = self.nodes[0]
+                parent = value, _, decided, answer = self.nodes[0]
                 self.lower = min(value, self.settled, self.most)
                 if self.lower >= min(self.most, self.settled):
                     return
@@ -52,7 +52,7 @@ class Branching:
                     continue
                 pair = [(*decided, one) for one in choice]
                 found = [list(self._solved(both, value)) for both in pair]
-                self.nodes.remove(self._parent(decided))
+                self.nodes.remove(parent)  # not before: time may end while its parts are solved
                 heapq.heapify(self.nodes)
                 yield from (w for motions in found for w in motions)
             self.lower = min(self.most, self.settled)
@@ -65,9 +65,6 @@ class Branching:
         self.nodes = [node for node in self.nodes if node[0] < self.most]
         heapq.heapify(self.nodes)
         self.lower = min([self.most, self.settled, *(node[0] for node in self.nodes[:1])])
-
-    def _parent(self, decided: tuple[Decision, ...]) -> Node:
-        return next(node for node in self.nodes if node[2] == decided)
 
     def _solved(self, decided: tuple[Decision, ...], least: float) -> Iterator[Array]:
         """Put the program of some decisions on the list, and its motion out."""

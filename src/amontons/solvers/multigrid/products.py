@@ -147,6 +147,16 @@ def _second_half(p_ptr, p_idx, row, column, indptr, indices, total):  # noqa: PL
 
 
 @njit(cache=True, error_model="numpy")
+def _noted(t, marks, found, count):
+    """How many entries are found with t, which is put behind them if it is new."""
+    if not marks[t]:
+        marks[t] = True
+        found[count] = t
+        count += 1
+    return count
+
+
+@njit(cache=True, error_model="numpy")
 def _spread(p_ptr, weights, node, first, place, chosen, blocks, out, marks, found):  # noqa: PLR0913
     """Add the chosen blocks, each times the weights of its node, at their places in out."""
     count = 0
@@ -156,10 +166,7 @@ def _spread(p_ptr, weights, node, first, place, chosen, blocks, out, marks, foun
         for b in range(p_ptr[i], p_ptr[i + 1]):
             w, t = weights[b], uint64(place[at])
             at += 1
-            if not marks[t]:
-                marks[t] = True
-                found[count] = t
-                count += 1
+            count = _noted(t, marks, found, count)
             for m in range(3):
                 for n in range(3):
                     out[t, m, n] += w * blocks[e, m, n]
@@ -176,10 +183,7 @@ def _half_blocks(p_ptr, blocks, node, first, place, chosen, change, out, marks, 
         for b in range(p_ptr[i], p_ptr[i + 1]):
             R, t = blocks[b], uint64(place[at])
             at += 1
-            if not marks[t]:
-                marks[t] = True
-                found[count] = t
-                count += 1
+            count = _noted(t, marks, found, count)
             for m in range(3):
                 for n in range(3):
                     out[t, m, n] += B[m, 0] * R[0, n] + B[m, 1] * R[1, n] + B[m, 2] * R[2, n]
@@ -196,10 +200,7 @@ def _rest_blocks(p_ptr, blocks, node, first, place, chosen, half, out, marks, fo
         for b in range(p_ptr[i], p_ptr[i + 1]):
             Q, t = blocks[b], uint64(place[at])
             at += 1
-            if not marks[t]:
-                marks[t] = True
-                found[count] = t
-                count += 1
+            count = _noted(t, marks, found, count)
             for m in range(3):
                 for n in range(3):
                     out[t, m, n] += Q[0, m] * B[0, n] + Q[1, m] * B[1, n] + Q[2, m] * B[2, n]
