@@ -14,9 +14,10 @@ from scipy import sparse
 from ..core.errors import SingularOperator
 from .aggregation import LARGEST, Aggregates, separates
 from .chunks import better_numbers
+from .coarsest import inverse_at_rest
 from .grid import GridBlocks
 from .level_matrix import LevelMatrix
-from .node_blocks import DEAD, NodeBlocks
+from .node_blocks import NodeBlocks
 from .patched import PatchedBlocks, PatchedOperator, Rows, patched
 from .transfer import Transfer
 from .vectors import advance, dot, norm, turn
@@ -27,7 +28,6 @@ Index = NDArray[np.int64]
 Kind = Callable[[LevelMatrix], LevelMatrix]
 COARSEST = 120  # nodes of the level that is solved directly, at most
 COARSEST_UNITS = 60  # aggregates of such a level
-SMALL = 1e-10  # singular values of the coarsest matrix below this part of the largest rest
 
 
 @dataclass(frozen=True, eq=False)
@@ -354,35 +354,6 @@ def append_level(
     return number
 
 
-def inverse_at_rest(A: Array, diagonal: Array, size: Array) -> Array:
-    """Inverse of A (3 n, 3 n) on the directions in which its diagonal blocks have stiffness.
-
-    diagonal (n, 3, 3); size (n,): their usual size.  A pseudo-inverse where that is singular.
-    """
-    if not A.size:
-        return A
-    left, s, right = np.linalg.svd(diagonal)
-    dead = s <= DEAD * size[:, None]
-    k = np.arange(len(diagonal))
-    whole = A.reshape(len(k), 3, len(k), 3).copy()
-    whole[k, :, k, :] += size[:, None, None] * ((left * dead[:, None, :]) @ right)
-    whole = whole.reshape(A.shape)
-    out = _inverse(whole)
-    regular = out is not None and np.abs(out).max() * np.abs(whole).max() * SMALL < 1
-    return out if out is not None and regular else _pseudo_inverse(A)
-
-
-def _inverse(A: Array) -> Array | None:
-    """A^-1 in half the time of `numpy.linalg.inv`, which solves for ones; None if singular."""
-    from scipy.linalg import lapack
-
-    factor, pivots, singular = lapack.dgetrf(A)
-    if singular:
-        return None
-    work = int(lapack.dgetri_lwork(len(A))[0].real)
-    return np.ascontiguousarray(lapack.dgetri(factor, pivots, lwork=work)[0])
-
-
 def _coarse_modes(levels: list[Level], nodes: Nodes, modes: Array | None) -> Array:
     """Near-nullspace at the nodes of the coarsest level, (3 count, k), by least squares."""
     from scipy.sparse import linalg as sparse_linalg
@@ -398,7 +369,3 @@ def _coarse_modes(levels: list[Level], nodes: Nodes, modes: Array | None) -> Arr
         normal = sparse.csc_array(P.T @ P + 1e-14 * sparse.eye_array(P.shape[1]))
         values = sparse_linalg.splu(normal).solve(P.T @ values)
     return values
-
-
-def _pseudo_inverse(A: Array) -> Array:
-    return np.linalg.pinv(A, rcond=SMALL).astype(float, copy=False)

@@ -29,7 +29,8 @@ from scipy import sparse
 
 from ...core.errors import InvalidInput
 from ...core.options import check_options
-from ...linear.hierarchy import SMALL, Hierarchy, Nodes
+from ...linear.coarsest import SMALL
+from ...linear.hierarchy import Hierarchy, Nodes
 from ...linear.level_matrix import LevelMatrix
 from ...linear.node_blocks import NodeBlocks, block_inverse
 from ...problem.one_sided import HELD, OneSided

@@ -11,7 +11,7 @@ from numba import uint64
 from numpy.typing import NDArray
 
 from ...core.compiled import njit
-from ...linear.hierarchy import inverse_at_rest
+from ...linear.coarsest import inverse_at_rest
 from ...linear.node_blocks import block_inverse
 from .nodes import ContactNodes
 from .products import Sum
