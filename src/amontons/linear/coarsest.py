@@ -26,7 +26,7 @@ def inverse_at_rest(A: Array, diagonal: Array, size: Array) -> Array:
     whole = whole.reshape(A.shape)
     out = _inverse(whole)
     regular = out is not None and np.abs(out).max() * np.abs(whole).max() * SMALL < 1
-    return out if out is not None and regular else _pseudo_inverse(A)
+    return out if out is not None and regular else pseudo_inverse(A)
 
 
 def _inverse(A: Array) -> Array | None:
@@ -40,5 +40,6 @@ def _inverse(A: Array) -> Array | None:
     return np.ascontiguousarray(lapack.dgetri(factor, pivots, lwork=work)[0])
 
 
-def _pseudo_inverse(A: Array) -> Array:
+def pseudo_inverse(A: Array) -> Array:
+    """That of A (n, n), without directions in which it has next to no stiffness."""
     return np.linalg.pinv(A, rcond=SMALL).astype(float, copy=False)

@@ -29,7 +29,7 @@ from scipy import sparse
 
 from ...core.errors import InvalidInput
 from ...core.options import check_options
-from ...linear.coarsest import SMALL
+from ...linear.coarsest import pseudo_inverse
 from ...linear.hierarchy import Hierarchy, Nodes
 from ...linear.level_matrix import LevelMatrix
 from ...linear.node_blocks import NodeBlocks, block_inverse
@@ -172,7 +172,7 @@ class ContactCycles:
     def _update_coarse(self, given: Conditions) -> None:
         """Galerkin matrices of this step, from the differences to the plain ones."""
         if not self.prolongations:  # small enough to be solved at once
-            self.coarse_inverse = np.linalg.pinv(self.matrices[0].dense(), rcond=SMALL)
+            self.coarse_inverse = pseudo_inverse(self.matrices[0].dense())
             return
         fixed = self._dirichlet(given)
         identity = np.eye(fixed.shape[1])
@@ -189,7 +189,7 @@ class ContactCycles:
                 P = self.prolongations[k]
                 delta = sparse.csr_array(P.T @ (delta @ P))
             _add_blocks(A, self.plain[k], delta)
-        self.coarse_inverse = np.linalg.pinv(self.matrices[-1].dense(), rcond=SMALL)
+        self.coarse_inverse = pseudo_inverse(self.matrices[-1].dense())
 
     # ------------------------------------------------------------------ cycles
     def cycle(self, x: Array, option: MultigridCycle) -> float:
