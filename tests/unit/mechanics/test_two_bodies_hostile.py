@@ -7,6 +7,7 @@ import pytest
 
 import amontons as am
 from amontons.mechanics.meshes import Facets
+from amontons.mechanics.model.large_deformation import large_deformation
 
 NEO = am.NeoHookean(1.0, 0.3)
 
@@ -247,3 +248,17 @@ def test_a_slave_that_is_held_everywhere_says_what_to_do():
     supports = [am.Fix("low.bottom", (0, 0.05)), am.Fix("up.bottom", 0), am.Fix("up.top", 0)]
     with pytest.raises(am.InvalidInput, match="make the master the slave"):
         am.solve(am.Model(bodies, supports, [am.Contact("up.bottom", master="low.top", mu=0)]))
+
+
+def test_a_corner_that_is_inside_out_is_named_where_no_integration_point_is():
+    """det F of a bilinear square is 1 - 0.6 (x + y): -0.2 at its corner, else 0.054 at least."""
+    square = am.Body(am.box((1, 1), 1), NEO, name="lower")
+    problem = large_deformation(am.Model([square], [am.Fix("lower.left", 0)], [
+        am.Contact("lower.top", am.Plane((0, -1), (0, 5)), mu=0)]))  # fmt: skip
+    u = np.zeros(square.mesh.points.shape)
+    u[(square.mesh.points == 1).all(axis=1)] = -0.6
+    v = u.ravel()[problem.parts.free]
+    assert "the corner at (1, 1) of cell 0 at (0.5, 0.5) is turned inside out, det F = -0.2 " \
+        "there, in body 'lower'" in problem.remark(v)  # fmt: skip
+    assert "pressed to det F = 0.0536" in problem.remark(v)
+    assert "corner" not in problem.remark(v / 2)

@@ -47,6 +47,7 @@ from .nonlinear_parts import NonlinearParts, nonlinear_parts
 from .obstacle_linearisation import Linearisation, turned_forces
 from .places_of_failure import places_of_failure
 from .pressure_states import PressureStates
+from .tangent_structure import rigid_modes
 
 if TYPE_CHECKING:
     from .model import Model
@@ -284,8 +285,9 @@ class LargeDeformation(NonlinearProblem):
 
     @property
     def meets_first(self) -> bool:
-        """True where some body keeps small strains: its cells may be inverted."""
-        return any(isinstance(body, LinearBody) for body in self.parts.bodies)
+        """True between bodies, and where one keeps small strains: its cells may be inverted."""
+        parts = self.parts
+        return parts.has_pairs or any(isinstance(body, LinearBody) for body in parts.bodies)
 
     def states(
         self, v: Array, known: tuple[LargeDeformation, Array] | None = None
@@ -325,7 +327,9 @@ class LargeDeformation(NonlinearProblem):
         meeting, w = self.parts.meet(displaced), np.array(tangent.w)
         across = meeting.relative(moved.reshape(displaced.shape))
         w[:, 0] += (meeting.normals * across).sum(axis=1)
-        return replace(tangent, f=tangent.f + force[self.parts.free], w=w)
+        free, part = self.parts.free, self.parts.numbering.part
+        modes = rigid_modes(self.parts.X + displaced, part)[free]
+        return replace(tangent, f=tangent.f + force[free], w=w, near_nullspace=modes, guess=v)
 
     def remark(self, v: Array) -> str:
         """Which slaves face nothing of their masters, have left them, and what is flat."""

@@ -7,9 +7,11 @@ steps from a state that is known, each begun by a tangent predictor,
     dF/dv dv = -(F(v) + dF/dload dload),
 
 which also moves the prescribed displacements: cells would be inverted by moving these alone.
-Where Newton's method fails from there, it starts from the solution of the tangent problem with
-contact: many contacts that close at once find their statuses together.  Bodies whose cells can
-be inverted begin with it, as nothing else keeps them from passing through their obstacles.
+Another predictor is the solution of the tangent problem with contact: contacts that change
+find their statuses together, where Newton's steps change them ring by ring, the more of them
+the finer the mesh.  It is roughly found, on large meshes by some cycles of contact multigrid.
+Problems say by `meets_first` which one comes first, the other one is tried where Newton's
+method fails from there.
 
 Line search: halving until |F| falls below the largest of the last few values; states with
 inverted cells are never accepted.  Where problems say so by `shortest`, it halves until the
@@ -56,6 +58,8 @@ REPEATED = 1e-12  # relative difference of |F| below which steps go round in cir
 JUMP = "; if the body jumps there, crossing=PathCrossing() of this solver follows it"
 STATUSES = 1e-8  # error of a tangent problem with contact
 CONTACT_STEPS = 300  # iterates in which it has to be reached
+ROUGH = 1e-4  # the same on meshes from MULTIGRID unknowns on; what it leaves out is more
+MULTIGRID, CYCLES = 3_000, 30  # most cycles
 EASY = 8  # Newton steps up to which the next load step may be longer
 
 
@@ -218,6 +222,8 @@ class NonlinearNewton:
         tangent = whole if whole.law.varies else whole.plain  # with springs behind v
         start = Iterate(np.zeros((tangent.contacts, tangent.dimension)))
         try:
+            if tangent.is_mesh and tangent.unknowns >= MULTIGRID:
+                return _by_cycles(tangent, start, target)[: whole.unknowns]
             most = EARLY if tangent.gains_energy else CONTACT_STEPS
             iterates = first_of(Auto().iterates(tangent, start, target), most)
             iterate = sent(iterates, None)
@@ -339,6 +345,21 @@ class NonlinearNewton:
         if not np.isfinite(best):
             raise _Failed(f"every step leads to where {reason}")
         return found
+
+
+def _by_cycles(tangent: FrictionProblem, start: Iterate, target: Target) -> Array:
+    """v (n,) of a tangent problem on a large mesh, to ROUGH by the measure of the cycles."""
+    from ..multigrid.cycles import ContactMultigrid  # which `auto` takes as well
+
+    goal = Target(ROUGH, target.deadline)
+    cycles = 0
+    for iterate in ContactMultigrid().iterates(tangent, start, goal):
+        cycles += iterate.iterations
+        if iterate.v is not None and iterate.own[-1] <= ROUGH:
+            return iterate.v
+        if cycles >= CYCLES or target.deadline.passed:
+            break
+    raise _Failed("the tangent problem with contact was not solved")
 
 
 class _Failed(Exception):
