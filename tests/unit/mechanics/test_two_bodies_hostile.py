@@ -251,7 +251,7 @@ def test_a_slave_that_is_held_everywhere_says_what_to_do():
 
 
 def test_a_corner_that_is_inside_out_is_named_where_no_integration_point_is():
-    """det F of a bilinear square is 1 - 0.6 (x + y): -0.2 at its corner, else 0.054 at least."""
+    """det F of a bilinear square is 1 - 0.6 (x + y): -0.2 at a corner, else at least 0.054."""
     square = am.Body(am.box((1, 1), 1), NEO, name="lower")
     problem = large_deformation(am.Model([square], [am.Fix("lower.left", 0)], [
         am.Contact("lower.top", am.Plane((0, -1), (0, 5)), mu=0)]))  # fmt: skip

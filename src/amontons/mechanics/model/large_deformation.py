@@ -47,7 +47,7 @@ from .nonlinear_parts import NonlinearParts, nonlinear_parts
 from .obstacle_linearisation import Linearisation, turned_forces
 from .places_of_failure import places_of_failure
 from .pressure_states import PressureStates
-from .tangent_structure import rigid_modes
+from .tangent_structure import free_modes
 
 if TYPE_CHECKING:
     from .model import Model
@@ -285,9 +285,8 @@ class LargeDeformation(NonlinearProblem):
 
     @property
     def meets_first(self) -> bool:
-        """True between bodies, and where one keeps small strains: its cells may be inverted."""
-        parts = self.parts
-        return parts.has_pairs or any(isinstance(body, LinearBody) for body in parts.bodies)
+        """True where some body keeps small strains: its cells may be inverted."""
+        return any(isinstance(body, LinearBody) for body in self.parts.bodies)
 
     def states(
         self, v: Array, known: tuple[LargeDeformation, Array] | None = None
@@ -319,17 +318,15 @@ class LargeDeformation(NonlinearProblem):
     def towards(self, share: float, goal: float, v: Array) -> FrictionProblem:
         """The tangent problem at a share and state v, under the load of another share."""
         now, then = self.at_share(share), self.at_share(goal)
-        tangent = now.linearised(v)
-        moved = then.prescribed - now.prescribed
-        displaced = now.displacement(v)
-        blocks = now._needed_slopes(displaced)[1]
+        tangent, displaced = now.linearised(v), now.displacement(v)
+        moved, blocks = then.prescribed - now.prescribed, now._needed_slopes(displaced)[1]
         force = (then.load - now.load).at(displaced) - self.parts.matrix(blocks) @ moved
         meeting, w = self.parts.meet(displaced), np.array(tangent.w)
         across = meeting.relative(moved.reshape(displaced.shape))
         w[:, 0] += (meeting.normals * across).sum(axis=1)
-        free, part = self.parts.free, self.parts.numbering.part
-        modes = rigid_modes(self.parts.X + displaced, part)[free]
-        return replace(tangent, f=tangent.f + force[free], w=w, near_nullspace=modes, guess=v)
+        force, modes = force[self.parts.free], free_modes(self.parts, displaced)
+        return replace(tangent, f=tangent.f + force, w=w, near_nullspace=modes, guess=v,
+                       load_scale=max(tangent.load, float(np.linalg.norm(force))))  # fmt: skip
 
     def remark(self, v: Array) -> str:
         """Which slaves face nothing of their masters, have left them, and what is flat."""
@@ -357,8 +354,7 @@ class LargeDeformation(NonlinearProblem):
 
         Between bodies that deform frames and averages stay as they are there.
         """
-        parts = self.parts
-        moved = self.displacement(v)
+        parts, moved = self.parts, self.displacement(v)
         needed, blocks = self._needed_slopes(moved)
         r, u, axes, rest = self._local(v)
         meeting = parts.meet(moved)
