@@ -10,7 +10,7 @@ import amontons as am
 from amontons.analysis.certificates.verdict import Verdict
 from amontons.analysis.hyperstatic.ball import motion_bound
 from amontons.analysis.hyperstatic.face import centred, face_of, longest
-from amontons.analysis.hyperstatic.frictionless import without_friction
+from amontons.solvers.newton.frictionless import without_friction
 from amontons.analysis.hyperstatic.held_tangents import held_tangents
 from amontons.analysis.hyperstatic.indeterminacy import indeterminacy
 from amontons.analysis.hyperstatic.motion import other_motion, rest
