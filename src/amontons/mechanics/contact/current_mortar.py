@@ -13,8 +13,8 @@ G the distance vector, g the gap, and s the motion since the last step, whose B 
 what slides is the change of B, not of x.  Rotations of everything leave B as it is: s = 0.
 A force lambda_p acts on p, and -B_pj lambda_p on the other nodes j: together no force, and a
 moment G_p x lambda_p, none where the sides touch all along, which `couples` take away.
-A node that met nobody at the end of the last step has as s_p its motion against the master node
-that was closest then.  One that was open then, by g' > 0, met the point over there along its
+A node that met nobody at the end of the last step has the motion of `newcomers`; one that meets
+nobody now has none.  One that was open then, by g' > 0, met the point over there along its
 normal n', but both sides turn towards each other until they touch: they come closer without a
 slip along the mean of n' and the master's normal n_M, towards the point d beside that one,
 
@@ -63,6 +63,7 @@ from .current_slopes import MortarSlopes
 from .facing import Skin
 from .fading import Fading
 from .folds import Fold
+from .newcomers import Newcomers
 from .shared import Shared
 
 Array = NDArray[np.float64]
@@ -331,12 +332,18 @@ class MortarMeeting:
         return np.where(self.met, along, np.linalg.norm(self.distances, axis=1))
 
     def motion(self, earlier: MortarMeeting) -> Array:
-        """s of (3), (nc, d), since `earlier`, at the end of the last step."""
+        """s of (3), (nc, d), since `earlier`, the end of the last step; none of who is alone."""
         both = (self.met & earlier.met)[:, None]
-        out = earlier.references @ self.x - np.where(both, self.distances, earlier.distances)
+        out = earlier.averages @ self.x - self.distances
         if earlier.approach.nnz:
             out -= self.closed_by(earlier)[:, None] * (earlier.approach @ self.x)
-        return out
+        out = np.where(both, out, 0.0)
+        newcomers = self.newcomers(earlier)
+        return out if newcomers is None else out + newcomers.motion
+
+    def newcomers(self, earlier: MortarMeeting) -> Newcomers | None:
+        """Nodes that meet now, and did not at the end of the last step; None for none."""
+        return Newcomers.between(self, earlier)
 
     @cached_property
     def fading(self) -> Fading | None:
