@@ -233,8 +233,8 @@ class MortarMeeting:
     @cached_property
     def bulges(self) -> sparse.csr_array:
         """Bulges of middles of both sides by positions, (nodes, nodes)."""
-        n = len(self.x)
-        return sparse.csr_array(self.pair.slave.bulges(n) + self.pair.master.bulges(n))
+        both = Skin.joined([self.pair.slave, self.pair.master])  # which may share middles
+        return both.bulges(len(self.x))
 
     @cached_property
     def passed(self) -> Array:
