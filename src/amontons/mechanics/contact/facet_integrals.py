@@ -134,12 +134,15 @@ class FacetPairs:
         e, h = self.widths
         found = np.zeros((k, a, a + e, *ways)), np.zeros((k, a, b + h, *ways))
         numbers = np.stack([self.corners, self.facing, self.bent, self.opposite], axis=1)
-        some = np.flatnonzero(self._visible > 0)
+        given, w = rules(second=e + h > 0), self._visible
+        if (w == 1).all():
+            kernel(self.slave, self.master, numbers, *given, *found)
+            return found
+        some = np.flatnonzero(w > 0)  # over outlines that cross themselves there is no integral
         parts = [part[some] for part in found]
-        kernel(self.slave[some], self.master[some], numbers[some], *rules(second=e + h > 0),
-               *parts)  # fmt: skip
+        kernel(self.slave[some], self.master[some], numbers[some], *given, *parts)
         for out, part in zip(found, parts, strict=True):
-            out[some] = part * _over(self._visible[some], part)
+            out[some] = part * _over(w[some], part)
         return found
 
     def _slopes_in_space(self, ways: int) -> tuple[Array, Array]:
