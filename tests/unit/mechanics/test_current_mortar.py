@@ -116,7 +116,8 @@ def test_motion_of_nodes_that_meet_anew_turns_with_the_master():
     own = here.motion(before)[new]
     assert np.linalg.norm(own, axis=1) == pytest.approx(0.6, rel=0.3)
     for angles in rng.uniform(-3, 3, (5, 2)):
-        now, then = (np.array([[np.cos(a), -np.sin(a)], [np.sin(a), np.cos(a)]]) for a in angles)
+        now, then = (np.array([[np.cos(a), -np.sin(a)], [np.sin(a), np.cos(a)]])
+                     for a in angles)  # fmt: skip
         moved = free.at(x @ now.T + 1.0).motion(free.at(before.x @ then.T - 2.0))[new]
         np.testing.assert_allclose(moved, own @ now.T, atol=1e-13)
     # who goes with a stretch of the master does not move against it

@@ -66,10 +66,9 @@ class MortarSlopes:
 
         All factors (nc, m, d); that of G of nodes that meet.
         """
-        both = (self.at.met & earlier.met)[:, None, None]
         newcomers = self.at.newcomers(earlier)
         entries = [] if newcomers is None else newcomers.entries(by_motion)
-        by_motion = by_motion * both
+        by_motion = by_motion * (self.at.met * earlier.remembered)[:, None, None]
         by_distance = by_distance - by_motion
         if earlier.approach.nnz:
             closed = self.at.closed_by(earlier)[:, None, None]

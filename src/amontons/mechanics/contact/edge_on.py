@@ -4,15 +4,15 @@ Seen along the normal n of a slave facet, the corners of a quadrilateral of the 
 
     sigma_c = n . a_c / n . a,    a_c = (x_c+1 - x_c) x (x_c-1 - x_c),    sum_c a_c = 4 a,  (1)
 
-a its area vector, of which 1 is the mean.  Where all are positive the outline is convex and the
-reference point of every point in it is found (`plane_shapes.reference`).  A plane facet has
-sigma_c = tau_c = a . a_c / a . a from wherever it is seen.  That of one which is warped, however
-little, loses a corner before it is seen edge-on, and its outline crosses itself: integrals over
-that are of no use.  So they, and all that follows, are taken times
+a its area vector, of which 1 is the mean.  Where all are positive the outline is convex, and
+Newton's method (`plane_shapes.reference`) finds the reference point of every point in it.  A
+plane facet has sigma_c = tau_c = a . a_c / a . a from wherever it is seen.  One that is warped,
+however little, loses a corner before it is seen edge-on, and its outline crosses itself:
+integrals over that are of no use.  So they, and all that follows, are taken times
 
     w = prod_c S(q_c),   q_c = (sigma_c tau_c + LEAST^2) / (tau_c^2 + LEAST^2),             (2)
 
-S rising from 0 at GONE to 1 at WHOLE.  q is the part of a corner's area that the warp leaves it;
+S rising from 0 at GONE to 1 at WHOLE.  q is the part of a corner's area that the warp leaves;
 where warps turn normals by an angle v it is 1 - v tan(b) as seen from b off the normal: facets
 of a fine mesh are whole until they are seen all but edge-on, when hardly any of them faces
 anybody.  LEAST leaves corners alone that have no area of their own, as where nodes coincide.

@@ -7,10 +7,10 @@ functions of first order of both and the integrals over the part they share, on 
 
 Facets of second order are projected as those on their corners are; behind phi and N stand then
 the functions of their other nodes, which move the surface by the bulges of `facing`.
-The integrals depend on the corners of the two facets alone; those of a warped facet that is seen
-all but edge-on fade, see `edge_on`.  Derivatives between lines are
-those of a complex step: the real parts decide where parts end, imaginary ones of 1e-100 carry
-the derivative through, exact to rounding as nothing is subtracted.
+The integrals depend on the corners of the two facets alone; those of a warped facet that is
+seen all but edge-on fade, see `edge_on`.  Derivatives between lines are those of a complex
+step: the real parts decide where parts end, imaginary ones of 1e-100 carry the derivative
+through, exact to rounding as nothing is subtracted.
 
 [PL] M. Puso, T. Laursen, "A mortar segment-to-segment contact method for large deformation
 solid mechanics", Comput. Methods Appl. Mech. Engrg. 193 (2004) 601-629.

@@ -1,7 +1,9 @@
-"""Motion of nodes that meet the master, and faced nobody at the end of the last step.
+"""Motion of nodes that meet the master, and hardly faced anybody at the end of the last step.
 
-Averages B' of `current_mortar` (3) there are none.  Such a node p counts its motion against the
-master's facets f that it meets now, by the parts w_pf of it that face them: each takes along the
+Averages B' of `current_mortar` (3) there are none, or they are extrapolations from a sliver,
+which tell small motions as large ones: that of a node whose law had the weight w' of `fading`
+is w' times (3), and 1 - w' times s_p here.  Such a node p counts its motion against the facets
+f of the master that it meets now, by the parts w_pf of it that face them: each takes along the
 place x'_p that p had beside it.  With N_q the functions of its corners, c and n its centre and
 unit normal, a prime where the last step ended, and grad along the facet there, at its centre,
 
@@ -37,13 +39,15 @@ Index = NDArray[np.int64]
 
 @dataclass(frozen=True, eq=False)
 class Newcomers:
-    """(2) of the nodes that meet at `at`, and did not at `earlier`.
+    """(2) of the nodes that meet at `at`, and at `earlier` did not or faded, times 1 - w'.
 
-    k parts: of node `row` (k,) in the slot `slot` (k,) of the pair of facets `pair` (k,).
+    new (nc,): 1 - w'.  k parts: of node `row` (k,) in the slot `slot` (k,) of the pair of
+    facets `pair` (k,).
     """
 
     at: MortarMeeting
     earlier: MortarMeeting
+    new: Array
     row: Index
     pair: Index
     slot: Index
@@ -51,12 +55,12 @@ class Newcomers:
     @classmethod
     def between(cls, at: MortarMeeting, earlier: MortarMeeting) -> Newcomers | None:
         """Those of two meetings of one pair; None where there are none."""
-        new = at.met & ~earlier.met
+        new = at.met * (1 - earlier.remembered)
         if not new.any():
             return None
         rows = at.rows[at.shared.of]
-        pair, slot = np.nonzero((rows >= 0) & new[rows])
-        return cls(at, earlier, rows[pair, slot], pair, slot)
+        pair, slot = np.nonzero((rows >= 0) & (new[rows] > 0))
+        return cls(at, earlier, new, rows[pair, slot], pair, slot)
 
     @cached_property
     def _facets(self) -> Skin:
@@ -90,15 +94,21 @@ class Newcomers:
         return np.einsum("kb,kbc->kc", A, there) + h[:, None] * shapes(self._facets, x)[1]
 
     @cached_property
-    def motion(self) -> Array:
+    def _whole(self) -> Array:
         """s, (nc, d), zero of all others."""
         out = np.zeros(self.at.normals.shape)
         np.add.at(out, self.row, -self._weights[:, None] * self._apart)
         return out
 
+    @property
+    def motion(self) -> Array:
+        """(1 - w') s, (nc, d), zero of all others."""
+        return self.new[:, None] * self._whole
+
     def entries(self, factors: Array) -> list[Blocks]:
-        """Those of the derivatives of factors_p (nc, m, d) times s_p of newcomers."""
-        (nc, m, d), k, facets = factors.shape, len(self.row), self._facets
+        """Those of the derivatives of factors_p (nc, m, d) times `motion`."""
+        factors = factors * self.new[:, None, None]
+        (m, d), k, facets = factors.shape[1:], len(self.row), self._facets
         (A, h), w = self._held, self._weights
         by, rows = factors[self.row], self.row[:, None] * m + np.arange(m)
         there = dofs_of(facets.nodes, d)
@@ -111,10 +121,11 @@ class Newcomers:
         _, cross, dofs = self.at.slopes.integrals
         corners = facets.nodes.shape[1]
         grown = cross[self.pair, self.slot, :corners].sum(axis=1)  # dW, (k, ways)
-        beside = self._apart + self.motion[self.row]
+        beside = self._apart + self._whole[self.row]
         grown *= self.at.by_weight[self.row, None]
         change = (by @ beside[:, :, None]) * grown[:, None]
         new = np.unique(self.row)
-        own = factors[new], new[:, None] * m + np.arange(m), dofs_of(self.at.slaves[new, None], d)
-        return [own, (by @ (-w[:, None, None] * moved), rows, there),
+        at = dofs_of(self.at.slaves[new, None], d)
+        return [(factors[new], new[:, None] * m + np.arange(m), at),
+                (by @ (-w[:, None, None] * moved), rows, there),
                 (-change, rows, dofs[self.pair])]  # fmt: skip
