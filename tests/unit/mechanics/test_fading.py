@@ -128,7 +128,7 @@ def test_motion_since_a_sliver_is_no_extrapolation_of_it(width):
     grown = here.met & earlier.met & (earlier.remembered < 1e-3)
     assert grown.any()
     motion = here.motion(earlier)[grown]
-    np.testing.assert_allclose(motion[:, :2] - (-0.15, 0), 0, atol=0.08)
+    np.testing.assert_allclose(motion[:, :2] - (-0.15, 0), 0, atol=0.04)
 
 
 def round_end(cells, name, *, up):
