@@ -23,6 +23,7 @@ from scipy import sparse
 
 from ...linear.sums import Blocks, by_components, sum_of_blocks, sum_of_products
 from .facet_integrals import FacetPairs
+from .facing import dofs_of
 
 if TYPE_CHECKING:
     from .current_mortar import MortarMeeting
@@ -65,18 +66,19 @@ class MortarSlopes:
 
         All factors (nc, m, d); that of G of nodes that meet.
         """
-        both = (self.at.met & earlier.met)[:, None, None]
-        by_distance = by_distance - by_motion * both
-        entries = []
+        newcomers = self.at.newcomers(earlier)
+        entries = [] if newcomers is None else newcomers.entries(by_motion)
+        by_motion = by_motion * (self.at.met * earlier.remembered)[:, None, None]
+        by_distance = by_distance - by_motion
         if earlier.approach.nnz:
             closed = self.at.closed_by(earlier)[:, None, None]
             entries.append(averaged(earlier.approach, -closed * by_motion))
             beside = np.asarray(earlier.approach @ self.at.x) * earlier.by_opening[:, None]
-            by_gap = (by_motion @ beside[:, :, None]) * both
+            by_gap = by_motion @ beside[:, :, None]
             by_normal = by_normal + by_gap * self.at.distances[:, None]
             by_distance = by_distance + by_gap * self.at.normals[:, None]
         entries += [self._normals.times(by_normal), *self.by_distances(by_distance),
-                    averaged(earlier.references, by_motion)]  # fmt: skip
+                    averaged(earlier.averages, by_motion)]  # fmt: skip
         nc, m = by_normal.shape[:2]
         return sum_of_blocks(entries, (nc * m, self.at.x.size))
 
@@ -131,7 +133,7 @@ class MortarSlopes:
         row = np.where(heeded, own[skin.nodes], -1)
         values = np.where((row >= 0)[:, :, None, None], project[row], 0.0)
         values = values @ (share / skin.corners[:, None, None, None])  # (f, a, d, a d)
-        return SlotSlopes(values, row, _dofs(skin.nodes, d))
+        return SlotSlopes(values, row, dofs_of(skin.nodes, d))
 
     @cached_property
     def integrals(self) -> tuple[Array, Array, Index]:
@@ -144,7 +146,7 @@ class MortarSlopes:
         own, cross = FacetPairs.of(
             pair.slave, parts.slave, pair.master, parts.master, self.at.x
         ).slopes()
-        return own, cross, _dofs(np.concatenate([slave, master], axis=1), self.at.x.shape[1])
+        return own, cross, dofs_of(np.concatenate([slave, master], axis=1), self.at.x.shape[1])
 
     @cached_property
     def weights(self) -> sparse.csr_array:
@@ -285,8 +287,3 @@ def blocks_of(values: Array) -> sparse.csr_array:
     nc, m, d = values.shape
     entries = (values, np.arange(nc), np.arange(nc + 1))
     return sparse.csr_array(sparse.bsr_array(entries, shape=(nc * m, nc * d)))
-
-
-def _dofs(nodes: Index, d: int) -> Index:
-    """Dofs (k, a d) of nodes (k, a)."""
-    return (nodes[:, :, None] * d + np.arange(d)).reshape(len(nodes), nodes.shape[1] * d)

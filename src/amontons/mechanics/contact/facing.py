@@ -176,6 +176,11 @@ class Skin:
         return out
 
 
+def dofs_of(nodes: Index, d: int) -> Index:
+    """Dofs (k, a d) of nodes (k, a)."""
+    return (nodes[:, :, None] * d + np.arange(d)).reshape(len(nodes), nodes.shape[1] * d)
+
+
 def _wider(table: Index, width: int, last: Index) -> Index:
     """A table (f, a) with `last` (f, 1) again and again, up to a width."""
     return np.concatenate([table, np.repeat(last, width - table.shape[1], axis=1)], axis=1)
