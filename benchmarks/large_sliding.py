@@ -75,7 +75,9 @@ MORE_RUNS = {  # where two programs differ: finer in mesh, load step and stiffne
     "pressed into a tube": (
         "amontons, fine, exchanged", "amontons, exchanged, half steps", "GetFEM, exchanged",
         f"{THIRD}, fine", f"{THIRD}, fine, half steps", f"{THIRD}, finer",
-        f"{THIRD}, finer, half steps", f"{THIRD}, finer, x 3", f"{THIRD}, finest",
+        f"{THIRD}, finer, half steps", f"{THIRD}, finer, quarter steps",
+        f"{THIRD}, finer, x 3", f"{THIRD}, finer, half steps, x 3", f"{THIRD}, finest",
+        f"{THIRD}, finest, half steps", f"{THIRD}, finest, half steps, x 3",
     ),
 }  # fmt: skip
 
