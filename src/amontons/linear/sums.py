@@ -87,7 +87,8 @@ def rows_of_products(products: Sequence[Product], shape: tuple[int, int]) -> Row
             data.append(left.data)
             first += len(left.indices)
         last += right.shape[0]
-    ends, columns, values, first = [np.zeros(1, np.int64)], [], [], 0
+    ends, columns, values = [np.zeros(1, np.int64)], [np.zeros(0, np.int64)], [np.zeros(0)]
+    first = 0
     for _, right in products:
         ends.append(right.indptr[1:] + np.int64(first))
         columns.append(right.indices)

@@ -44,10 +44,11 @@ def test_products_add_up():
     alone = some(6, 8, 5)
     wanted = (a @ b + c @ e + alone).toarray()
     same(sum_of_products([(a, b), (c, e), (None, alone)], (6, 8)), wanted)
+    assert sum_of_products([], (6, 8)).nnz == 0
 
 
 def test_rows_go_on_as_they_are():
-    every, wide = sparse.csr_array(np.ones((7, 2))), some(2, 9, 6)  # more entries than there are
+    every, wide = sparse.csr_array(np.ones((7, 2))), some(2, 9, 6)  # fills up
     found = rows_of_products([(every, wide), (None, some(7, 9, 7))], (7, 9))
     wanted = (every @ wide + some(7, 9, 7)).toarray()
     same(found.matrix, wanted)
