@@ -137,7 +137,9 @@ class Skin:
         if x.shape[1] == 2:
             edge = p[:, 1] - p[:, 0]
             return np.stack([edge[:, 1], -edge[:, 0]], axis=1)
-        return 0.5 * np.cross(p[:, 2] - p[:, 0], p[:, -1] - p[:, 1])
+        a, b = (p[:, 2] - p[:, 0]).T, 0.5 * (p[:, -1] - p[:, 1]).T
+        return np.stack([a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2],
+                         a[0] * b[1] - a[1] * b[0]], axis=1)  # fmt: skip
 
     def gradients(self, x: Array, chosen: Index) -> Array:
         """Surface gradients of the functions of corners at the centres of facets, (k, a, d).
