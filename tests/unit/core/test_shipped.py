@@ -1,5 +1,6 @@
 """Kernels that come with the package: used where they fit, and only there."""
 
+import importlib.util
 import json
 import os
 import shutil
@@ -312,3 +313,19 @@ main(["solve", "example:{example}", "-o", "out", "--quiet"], standalone_mode=Fal
     )  # fmt: skip
     assert done.returncode == 0, done.stderr
     assert "compiles" not in done.stdout
+
+
+@pytest.mark.skipif(sys.platform == "win32", reason="groups of processes are of POSIX")
+def test_a_build_that_takes_too_long_leaves_no_process(tmp_path):
+    """Those that the compiling had started went on for as long as it takes."""
+    pytest.importorskip("hatchling")
+    spec = importlib.util.spec_from_file_location(
+        "hook", Path(__file__).parents[3] / "packaging/hook.py"
+    )
+    hook = importlib.util.module_from_spec(spec)
+    spec.loader.exec_module(hook)
+    note = tmp_path / "number"
+    with pytest.raises(subprocess.TimeoutExpired):
+        hook.finished(["sh", "-c", f"sleep 60 & echo $! > {note}; wait"], 0.5)
+    state = Path(f"/proc/{note.read_text().strip()}/stat")
+    assert not state.exists() or state.read_text().split()[2] in "ZX"
