@@ -26,18 +26,17 @@ def finished(command: list[str], limit: float) -> subprocess.CompletedProcess[st
     Raises TimeoutExpired; processes that it has started would compile on for minutes.
     """
     pipe = subprocess.PIPE
-    process = subprocess.Popen(
+    with subprocess.Popen(
         command, stdout=pipe, stderr=pipe, text=True, start_new_session=True
-    )
-    try:
-        out, err = process.communicate(timeout=limit)
-    except BaseException:  # Ctrl-C too
-        if sys.platform == "win32":
-            process.kill()
-        else:
-            os.killpg(process.pid, signal.SIGKILL)
-        process.wait()
-        raise
+    ) as process:
+        try:
+            out, err = process.communicate(timeout=limit)
+        except BaseException:  # Ctrl-C too
+            if sys.platform == "win32":
+                process.kill()
+            else:
+                os.killpg(process.pid, signal.SIGKILL)
+            raise
     return subprocess.CompletedProcess(command, process.returncode, out, err)
 
 
