@@ -39,11 +39,10 @@ def run(
         say_when(opened.target)
     if json_copy is not None:
         deliver_json(to_json(verdict_record(found)), json_copy)
-    if certificate is not None and not deliver_certificate(
+    written = certificate is None or deliver_certificate(
         target, found, certificate, json_copy == "-"
-    ):
-        return UNSETTLED
-    if found.verdict is not Verdict.UNDECIDED:
+    )
+    if written and found.verdict is not Verdict.UNDECIDED:
         return 0
     return UNSETTLED if stop.received is None else stop.code
 
