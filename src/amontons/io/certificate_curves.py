@@ -1,4 +1,4 @@
-"""All solutions in 3D, for one load or for all between two, as a file for `certificate_checker`.
+"""All solutions in 3D, of one load or of all between two, as a file for `certificate_checker`.
 
     tree (b,)   boxes in the order in which the checker divides them: -1 excluded, -2 a tube,
                 else the contact that is decided, nc for the time
@@ -26,8 +26,10 @@ from ..analysis.solutions.load_interval import START
 from ..analysis.statuses import SLIP, states_of
 from ..core.clock import Deadline
 from ..core.errors import InvalidInput
-from .certificate_checker.curves import ARCS, SIZES, Problem, chains, divided
+from .certificate_checker.boxes import ARCS, Problem, divided
+from .certificate_checker.curves import chains
 from .certificate_checker.numbers import Refused
+from .certificate_checker.tubes import forms_of, tube
 
 Array = NDArray[np.float64]
 Box = tuple[str, Any, tuple[float, float]]
@@ -140,10 +142,10 @@ class _Tree:
         return node.parts
 
     def _widest(self, box: Box) -> int:
-        """What to divide of decided contacts: the widest arc, or the time, as the load turns."""
+        """What to divide of decided contacts: the widest arc, or the time as the load turns."""
         (letters, arcs, (first, last)), problem = box, self.problem
-        wide = np.array([_arc(arc)[1] * (x == "l") for x, arc in zip(letters, arcs, strict=True)])
-        wide = np.append(wide, (last - first) / 2)
+        arc = [_arc(one)[1] * (x == "l") for x, one in zip(letters, arcs, strict=True)]
+        wide = np.array([*arc, (last - first) / 2])
         (a, b, _), mus = _at_ends(problem.loads, box[2]), problem.mus
         turns = np.linalg.norm(b - a) / max(np.linalg.norm(a + b), 1e-300)
         rubs = np.abs(mus[1] - mus[0]).max() * wide[-1]
@@ -162,12 +164,12 @@ class _Tree:
         if found is None:
             return False
         try:
-            tube = self.problem.tube(node.box, *found)
+            held = tube(self.problem, node.box, *found)
         except (Refused, np.linalg.LinAlgError):
             return False
-        if tube is not None and tube[3] > THIN * np.abs(np.stack(tube[1:3])[:, 1:]).max():
+        if held is not None and held[3] > THIN * np.abs(np.stack(held[1:3])[:, 1:]).max():
             return False
-        node.kind, node.told = -2, (*found, tube)
+        node.kind, node.told = -2, (*found, held)
         return True
 
     def _centre(self, box: Box, guess: Array) -> tuple[Array, int] | None:
@@ -186,7 +188,7 @@ class _Tree:
                     "l": [r[0], p, *e, np.hypot(*u[1:])]}  # fmt: skip
             x += tell[letter]
         c, n = np.array([*x, middle]), len(x)
-        zero = self.problem.forms(letters)[0][:, 0]
+        zero = forms_of(self.problem, letters)[0][:, 0]
         M = zero + zero.swapaxes(1, 2)
         low, high = self.problem.ranges(box)
         choice = [*turns, n] if span[0] < span[1] else [n]
@@ -214,14 +216,16 @@ class _Tree:
         x = np.zeros((len(told), 1 + 5 * nc))
         for row, (c, _, _) in zip(x, told, strict=True):
             row[: len(c)] = c
-        tubes = [tube for *_, tube in told if tube is not None]
+        tubes = [held for *_, held in told if held is not None]
         sure, low, high, off = (np.array(a) for a in zip(*tubes, strict=True))
         at = []
         for chain in chains(low, high):
             best = chain[np.argmax(sure[chain])]
             if not sure[best]:
-                raise InvalidInput(f"certificate: at {low[best, 0]:.9g} there may be a solution, "
-                                   "or none: two statuses meet there")  # fmt: skip
+                raise InvalidInput(
+                    f"certificate: at {low[best, 0]:.9g} there may be a solution, or none: two "
+                    "statuses meet there"
+                )
             at.append((low[best] + high[best]) / 2)
         points = np.array(at)
         return {
@@ -234,7 +238,7 @@ class _Tree:
 
 
 def _on_curve(M: Array, c: Array, k: int) -> Array | None:
-    """The point with x_k where forms vanish, by Newton's method from c, or None; M: twice them."""
+    """The point with x_k where forms vanish, by Newton's method, or None; M: twice them."""
     c, others = c.copy(), np.delete(np.arange(len(c)), k)
     for _ in range(NEWTON):
         X = np.append(c, 1.0)
