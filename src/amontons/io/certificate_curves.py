@@ -38,7 +38,7 @@ MOST = 60_000  # boxes of a certificate
 WORK = 4e5, 800.0, 4e6  # operations of a box, and per cube of the reactions; of a tube
 NEWTON, CONVERGED, LOST = 20, 1e-14, 1e6  # steps to a centre; the last one; largest number
 FAR = 4.0  # times a box that its centre may be off
-THIN = 1e-3  # of the reactions in it, how far from its line a tube may reach
+THIN, NOTHING = 1e-3, 1e-9  # how far a tube reaches from its line: of its reactions, scaled
 FINEST = 1e-8  # half of an arc, or of a span, that is not divided
 ROOM = 1.1  # times the distance here, for other processors
 FRICTIONLESS = "o"
@@ -167,7 +167,7 @@ class _Tree:
             held = tube(self.problem, node.box, *found)
         except (Refused, np.linalg.LinAlgError):
             return False
-        if held is not None and held[3] > THIN * np.abs(np.stack(held[1:3])[:, 1:]).max():
+        if held is not None and held[3] > THIN * np.abs(held[1:3])[:, 1:].max() + NOTHING:
             return False
         node.kind, node.told = -2, (*found, held)
         return True
