@@ -43,7 +43,7 @@ def all_at(W: Array, q: Array, mu: Array) -> list[Array]:
         slip = [i for i, letter in enumerate(pattern) if letter == "l"]
         around = np.arange(GRID.get(len(slip), 1)) * 2 * np.pi / GRID.get(len(slip), 1)
         angles = np.array(list(itertools.product(around, repeat=len(slip))))
-        for r in _of_pattern(W, q, mu, pattern, slip, angles.reshape(-1, len(slip))):
+        for r in _of_pattern(W, q, mu, pattern, slip, angles):
             if not any(np.abs(r - x).max() < SAME * (1 + np.abs(x).max()) for x in found):
                 found.append(r)
     return found
@@ -114,20 +114,29 @@ def _reactions(
 
 # ------------------------------------------------------------------ problems
 def problem_of(seed: int, d: int, nc: int) -> tuple[Array, Array, Array]:
-    """W (m, m), loads (2, nc, d), coefficients (2, nc)."""
-    random, m = np.random.default_rng(seed), d * nc
+    """W (m, m), loads (2, nc, d), coefficients (2, nc).
+
+    Odd seeds couple the normal of a contact with one of its tangents, so that several solutions
+    are likely.
+    """
+    random, m, coupled = np.random.default_rng(seed), d * nc, seed % 2 == 1
     A = random.normal(size=(m, m))
     W = A @ A.T / m + random.choice([0.02, 0.1, 0.5]) * np.eye(m)
+    if coupled:
+        own = np.eye(d)
+        own[0, 1] = own[1, 0] = random.uniform(0.7, 0.95)
+        W = np.kron(np.eye(nc), own) + 0.05 * A @ A.T / m
     if seed % 3 == 2:
         S = random.normal(size=W.shape)
-        W = W + 0.2 * (S - S.T)
-    mu = np.tile(random.uniform(0.2, 3.0 if d == 2 else 1.2, nc), (2, 1))
+        W = W + (0.02 if coupled else 0.2) * (S - S.T)
+    most = 3.0 if d == 2 or coupled else 1.2
+    mu = np.tile(random.uniform(1.0 if coupled else 0.2, most, nc), (2, 1))
     if seed % 4 == 3 and d == 3:
         mu[1] *= random.uniform(0.3, 2)
     if seed % 7 == 5:
         mu[:, 0] = 0.0
     q = random.normal(size=(2, nc, d))
-    q[:, :, 0] -= random.uniform(0, 1.5)
+    q[:, :, 0] -= random.uniform(-0.5 if coupled else 0, 0.5 if coupled else 1.5)
     if seed % 5 == 4:
         q[0] = 0.0
     return W, q, mu
@@ -185,8 +194,9 @@ def compare(
 
 
 def certify(
-    row: Row, diagram: am.Diagram, start: am.FrictionProblem, end: am.FrictionProblem, path: Path
-) -> None:
+    row: Row, diagram: am.Diagram, start: am.FrictionProblem, end: am.FrictionProblem,
+    path: Path,
+) -> None:  # fmt: skip
     """Write a diagram as a certificate, and check it."""
     try:
         am.write_certificate(start, diagram, path, end=end)
@@ -217,8 +227,8 @@ def main() -> None:
                 examine(row, seed, d, nc, asked.loads, Path(folder))
             c = row.count
             lines.append(
-                f"| {d}D | {nc} | {c['problems']} | {c['whole']} | {c['loops']} | {c['loads']} | "
-                f"{c['solutions']} | {c['several']} | **{c['missing']}** | "
+                f"| {d}D | {nc} | {c['problems']} | {c['whole']} | {c['loops']} | "
+                f"{c['loads']} | {c['solutions']} | {c['several']} | **{c['missing']}** | "
                 f"{c['missing, said so']} | {c['too many']} | {row.far:.0e} | "
                 f"{np.median(row.seconds):.2f} | {max(row.seconds):.1f} |"
             )
@@ -244,12 +254,12 @@ Python {python}; CPU seconds, kernels compiled in the largest ones.
 
 Random problems (W symmetric or not, friction that changes in 3D, contacts without friction,
 loads that begin at zero), each at {loads} random loads beside brute force that shares no code:
-every pattern of statuses, from a grid of slip directions by Newton's method.  Missing: solutions
-of brute force that a diagram said to be whole, or outside of the loads that it says to be
-undecided, does not have; said so: that it does not have and that it names as undecided.  Too
-many: loads at which it has one that brute force does not find.  Apart: relative.
+every pattern of statuses, from a grid of slip directions by Newton's method.  Missing:
+solutions of brute force that are not on a diagram, though it said to be whole, or named other
+loads as undecided; said so: others that are not on it.  Too many: loads at which it has one
+that brute force does not find.  Of several: loads that have more than one.  Apart: relative.
 
-| | contacts | problems | proved whole | closed branches | loads | solutions | loads with several |\
+| | contacts | problems | proved whole | closed branches | loads | solutions | of several |\
  missing | said so | too many | apart | s, median | s, most |
 |---|---|---|---|---|---|---|---|---|---|---|---|---|---|
 {rows}

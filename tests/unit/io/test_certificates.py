@@ -442,3 +442,15 @@ def test_boxes_that_hold_a_solution_are_never_excluded():
             y[:, [x != "l" for x in letters], 1:] = 0.0
             boxes = [(letters, (arc, ARCS[0]), (0.0, 0.0))] * 500
             assert not checked.excluded(boxes, y).any()
+
+
+def test_the_command_line_proves_diagrams(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    hild = ["follow", "example:hild", "--from", "0.5", "--no-figures", "-o", "out"]
+    ran = CliRunner().invoke(main, [*hild, "--all", "--certificate", "c.h5"])
+    assert ran.exit_code == 0
+    assert "all branches: certificate in c.h5" in ran.output
+    assert "all loads between two" in am.check_certificate("c.h5")
+    ran = CliRunner().invoke(main, [*hild, "--certificate", "d.h5"])
+    assert ran.exit_code == 2
+    assert "--all" in ran.output
