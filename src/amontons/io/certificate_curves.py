@@ -198,8 +198,10 @@ class _Tree:
             choice.sort(key=lambda j: -d[j])
         for k in choice:
             point = _on_curve(M, c, k)
-            off = np.inf if point is None else np.abs(point - c)[[*turns, n]] / FAR
-            if (off <= (high - low)[[*turns, n]]).all():
+            if point is None:
+                continue
+            off = np.abs(point - c)[[*turns, n]]
+            if (off <= FAR * (high - low)[[*turns, n]]).all():
                 return point, k
         return None
 
