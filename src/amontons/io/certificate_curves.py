@@ -36,6 +36,7 @@ Box = tuple[str, Any, tuple[float, float]]
 BATCH = 200  # boxes that the checker looks at together
 MOST = 60_000  # boxes of a certificate
 WORK = 4e5, 800.0, 4e6  # operations of a box, and per cube of the reactions; of a tube
+SPARE, SLOWER = 1 + 1e-6, 1.6  # bounds by which the kernel is stricter than the checker
 NEWTON, CONVERGED, LOST = 20, 1e-14, 1e6  # steps to a centre; the last one; largest number
 FAR = 4.0  # times a box that its centre may be off
 THIN, NOTHING = 1e-3, 1e-9  # how far a tube reaches from its line: of its reactions, scaled
@@ -84,10 +85,17 @@ class _Tree:
     seen: int = 0
 
     def grow(self, span: tuple[float, float]) -> None:
-        """Divide all that is not excluded and is no tube."""
+        """Divide all that is not excluded and is no tube, or one that may hold nothing."""
         nc = self.problem.mus.shape[1]
         self.root = _Node(("." * nc, (ARCS[0],) * nc, span))
         stack = [self.root]
+        while stack:
+            self._divide(stack)
+            stack = self._doubtful()
+
+    def _divide(self, stack: list[_Node]) -> None:
+        """Divide nodes until the checker takes what is left."""
+        nc = self.problem.mus.shape[1]
         while stack:
             batch, stack = stack[-BATCH:], stack[:-BATCH]
             self.seen += len(batch)
@@ -97,6 +105,29 @@ class _Tree:
                 raise InvalidInput(f"certificate: stopped after {why}, with {len(stack)} left")
             for node, guess in self._left_of(batch):
                 stack += self._parts(node, guess)
+
+    def _doubtful(self) -> list[_Node]:
+        """The parts of tubes of curves that nowhere surely hold a solution."""
+        held = [node for node in self.nodes() if node.kind == -2 and node.told[2] is not None]
+        sure, low, high, _ = (np.array(a) for a in zip(*(x.told[2] for x in held), strict=True))
+        parts: list[_Node] = []
+        for chain in chains(low, high):
+            for node in [held[j] for j in chain if not sure[chain].any()]:
+                node.kind, node.told = self._widest(node.box), None
+                node.parts = [_Node(one) for one in self._divided(node)]
+                parts += node.parts
+        return parts
+
+    def _divided(self, node: _Node) -> list[Box]:
+        return divided(node.box, node.kind, self.problem.rubs)
+
+    def nodes(self) -> list[_Node]:
+        """All nodes, in the order of the file."""
+        nodes, stack = [], [self.root]
+        while stack:
+            nodes.append(stack.pop())
+            stack += reversed(nodes[-1].parts)
+        return nodes
 
     def _left_of(self, batch: list[_Node]) -> list[tuple[_Node, Array]]:
         """The nodes that are not excluded, with (r, u) near which there may be a solution."""
@@ -122,8 +153,8 @@ class _Tree:
         mus[:2] = np.sort(mus[:2], axis=0)
         y, guess = np.zeros(3 * nc), np.zeros((nc, 6))
         part = float(problem.part(np.array([span]))[0])
-        hopeful = exclude(problem.W, states, angles, mus, loads, problem.most * part,
-                          problem.fast * part, y, guess)  # fmt: skip
+        hopeful = exclude(problem.W, states, angles, mus, loads, problem.most * part * SPARE,
+                          problem.fast * part * SLOWER, y, guess)  # fmt: skip
         return bool(hopeful), y.reshape(nc, 3), guess
 
     def _parts(self, node: _Node, guess: Array) -> list[_Node]:
@@ -138,7 +169,7 @@ class _Tree:
                 return []
             i = self._widest(node.box)
         node.kind = i
-        node.parts = [_Node(part) for part in divided(node.box, i, problem.rubs)]
+        node.parts = [_Node(part) for part in self._divided(node)]
         return node.parts
 
     def _widest(self, box: Box) -> int:
@@ -209,10 +240,7 @@ class _Tree:
     def arrays(self) -> dict[str, Any]:
         """All of the file but the problem and the span."""
         nc, to_r = self.problem.mus.shape[1], self.problem.to_r
-        nodes, stack = [], [self.root]
-        while stack:
-            nodes.append(stack.pop())
-            stack += reversed(nodes[-1].parts)
+        nodes = self.nodes()
         y = [node.told for node in nodes if node.kind == -1]
         told = [node.told for node in nodes if node.kind == -2]
         x = np.zeros((len(told), 1 + 5 * nc))
@@ -223,11 +251,6 @@ class _Tree:
         at = []
         for chain in chains(low, high):
             best = chain[np.argmax(sure[chain])]
-            if not sure[best]:
-                raise InvalidInput(
-                    f"certificate: at {low[best, 0]:.9g} there may be a solution, or none: two "
-                    "statuses meet there"
-                )
             at.append((low[best] + high[best]) / 2)
         points = np.array(at)
         return {
