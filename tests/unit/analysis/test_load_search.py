@@ -216,6 +216,6 @@ def test_more_contacts_than_an_interval_takes_are_told():
     nc = LARGEST + 1
     W = np.eye(3 * nc)
     a, b = (problem(W, np.tile(q, (nc, 1)), [0.3] * nc) for q in ([-1, 0.1, 0], [-1, 0.2, 0]))
-    diagram = am.diagram(b, base=a, at=[1.0], time_limit=Deadline.counted(5.0))
+    diagram = am.diagram(b, base=a, time_limit=Deadline.counted(20.0))
     assert diagram.whole is None
     assert f"{nc} contacts: the search of an interval takes up to {LARGEST}" in diagram.reason

@@ -300,7 +300,7 @@ Examples:
   amontons follow example:vee                     two folds, three solutions between them
   amontons follow example:vee --all --mu 2
   amontons follow example:hild --parameter friction --from 0.1 --to 5 --all
-  amontons follow example:hild --all --certificate c.h5     then amontons check c.h5
+  amontons follow example:hild --from 0.5 --all --certificate c.h5     then amontons check c.h5
   amontons follow example:vee --set continuation.switch=tangent --set continuation.step=1e-3
 
 \b
