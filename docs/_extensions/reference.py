@@ -63,7 +63,7 @@ GROUPS = {
         "`Auto` chooses; these are what it chooses from, and what you can choose yourself.",
         "Auto Hybrid GaussSeidel Jacobi ProximalPoint Uzawa AcceleratedGradient "
         "SemismoothNewton SmoothingNewton InexactNewton InteriorPoint NonlinearNewton "
-        "ActiveSet ContactMultigrid CompressedDelassus",
+        "FrictionlessInteriorPoint ActiveSet ContactMultigrid CompressedDelassus",
     ),
     "Parts of solvers": (
         "Options of the solvers that are more than numbers.",

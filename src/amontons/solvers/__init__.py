@@ -11,6 +11,7 @@ from .gradient.accelerated import AcceleratedGradient, GradientIterate, Metric, 
 from .gradient.uzawa import InnerStart, Uzawa
 from .multigrid.cycles import ContactMultigrid
 from .newton.fischer_burmeister import FischerBurmeister
+from .newton.frictionless import FrictionlessInteriorPoint
 from .newton.functions import AlartCurnier, ComplementarityFunction, JeanMoreau, NaturalMap
 from .newton.inexact import InexactNewton
 from .newton.interior_point import InteriorPoint
@@ -29,6 +30,7 @@ METHODS: dict[str, type] = {
     "auto": Auto,
     "compressed-delassus": CompressedDelassus,
     "contact-multigrid": ContactMultigrid,
+    "frictionless-interior-point": FrictionlessInteriorPoint,
     "gauss-seidel": GaussSeidel,
     "hybrid": Hybrid,
     "jacobi": Jacobi,
@@ -58,6 +60,7 @@ __all__ = [
     "FischerBurmeister",
     "FrictionBound",
     "FrictionFunction",
+    "FrictionlessInteriorPoint",
     "FullStep",
     "GaussSeidel",
     "GoldsteinPrice",

@@ -10,7 +10,6 @@ import amontons as am
 from amontons.analysis.certificates.verdict import Verdict
 from amontons.analysis.hyperstatic.ball import motion_bound
 from amontons.analysis.hyperstatic.face import centred, face_of, longest
-from amontons.analysis.hyperstatic.frictionless import without_friction
 from amontons.analysis.hyperstatic.held_tangents import held_tangents
 from amontons.analysis.hyperstatic.indeterminacy import indeterminacy
 from amontons.analysis.hyperstatic.motion import other_motion, rest
@@ -18,6 +17,7 @@ from amontons.analysis.hyperstatic.ranges import reaction_ranges
 from amontons.core.clock import Deadline
 from amontons.mechanics.ready.hild import hild_triangle
 from amontons.mechanics.ready.packings import SpherePacking
+from amontons.solvers.newton.frictionless import without_friction
 
 
 @pytest.mark.parametrize("form", ["global", "delassus"])

@@ -28,8 +28,8 @@ from ...core.errors import SingularOperator
 from ...problem.friction import FrictionProblem
 from ...problem.solution import FrictionSolution
 from ...solvers.driver import drive
+from ...solvers.newton.frictionless import without_friction
 from .face import rank_factor
-from .frictionless import without_friction
 
 Array = NDArray[np.float64]
 FITS = 1e-9  # part of q outside of the range of W that counts as rounding

@@ -8,6 +8,7 @@
                                     not; when it breaks down or stalls, as below
     global form, W dear             `CompressedDelassus`, then semismooth Newton without W, then
                                     the Delassus form after all if W fits into memory
+    global form, M singular, mu = 0 `FrictionlessInteriorPoint`, then as below
     global form, M singular         semismooth Newton with a factor of the whole system;
                                     on a mesh `ContactMultigrid`; Newton on the natural map;
                                     active sets; proximal points (`tethers`)
@@ -58,6 +59,7 @@ from ..contract import (
 )
 from ..judging import first_of, sent
 from ..multigrid.cycles import ContactMultigrid
+from ..newton.frictionless import FrictionlessInteriorPoint, has_no_friction
 from ..newton.functions import NaturalMap
 from ..newton.nitsche import robust_iterates
 from ..newton.nonlinear import NonlinearNewton, NonlinearProblem
@@ -70,6 +72,7 @@ from .portfolio import Portfolio
 from .tethers import Tethers
 
 MESH = 3_000  # unknowns of a mesh from which multigrid beats a factorisation
+FACTORED = 300_000  # unknowns up to which some tens of factorisations are no matter
 SAME = 1e-12  # relative difference of errors up to which they are the same
 STALLED = 20  # iterates without halving the error after which Auto changes the method
 
@@ -180,6 +183,9 @@ class Auto:
 
 def _of_global_form(problem: FrictionProblem, start: Iterate, target: Target) -> Iterates:
     best = _Best(start, target.start_error)
+    if _is_loose_without_friction(problem):
+        slides = FrictionlessInteriorPoint()
+        yield from _watched(slides, problem.assembled(), best, target, best)
     if _worth_multigrid(problem):
         yield from _watched(ContactMultigrid(), problem, best, target, best)
     problem = problem.assembled()
@@ -222,6 +228,13 @@ def _worth_multigrid(problem: FrictionProblem) -> bool:
     if problem.unknowns < MESH:
         return False
     return _is_mesh(problem) and not problem.condensing_is_cheap
+
+
+def _is_loose_without_friction(problem: FrictionProblem) -> bool:
+    """True where neither M nor friction holds a body, and a factor of M is no great matter."""
+    if problem.unknowns > FACTORED or not has_no_friction(problem):
+        return False
+    return problem.matrices.loose_modes.shape[1] > 0
 
 
 def _regular(problem: FrictionProblem) -> bool:

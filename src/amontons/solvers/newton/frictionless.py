@@ -19,17 +19,20 @@ iterate itself, e slows steps down and does not change what they tend to.
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, ClassVar
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy import sparse
 
-from ...core.clock import Deadline
+from ...core.clock import NEVER, Deadline
 from ...core.errors import SingularOperator
 from ...linear.direct import Direct
-from ...problem.friction import FrictionProblem
+from ...problem.friction import Form, FrictionProblem
+from ...problem.law import Coulomb
+from ..contract import Breakdown, Iterate, Target
 
 Array = NDArray[np.float64]
 STEPS = 80
@@ -37,6 +40,39 @@ BOUNDARY = 0.995  # part of the way to p = 0 or s = 0 that a step goes
 HELD = 1e-8  # e, share of the diagonal of M
 BALANCE, GAPS, CLOSED = 1e-11, 1e-9, 1e-9  # what r_d, r_p and s.p may be, relative, at the end
 FILL = 60.0  # operations of a factor per entry of M and root of the unknowns, roughly
+
+
+@dataclass(frozen=True)
+class FrictionlessInteriorPoint:
+    """Interior point on M v = f + H_N p, 0 <= p, 0 <= H_N^T v + w_N: contact without friction.
+
+    M may be singular, bodies held by contact alone.  It begins at a point of its own; a problem
+    with friction or without a load f ends with the outcome BREAKDOWN.  Source: [M], Mehrotra.
+    """
+
+    form: ClassVar[Form] = Form.GLOBAL
+
+    def iterates(
+        self, problem: FrictionProblem, start: Iterate, target: Target
+    ) -> Iterator[Iterate]:
+        """A step each, until (1) holds to rounding or STEPS are done."""
+        if not has_no_friction(problem):
+            raise Breakdown("there is friction: this method is for mu = 0 at every contact")
+        program = _Program.of(problem)
+        if not program.load > 0:
+            raise Breakdown("there is no load f")
+        r = np.zeros((problem.contacts, problem.dimension))
+        for v, p, _ in program.iterates(target.deadline):
+            if not (np.isfinite(p).all() and np.isfinite(v).all()):
+                raise Breakdown("its steps are no longer finite")
+            r[:, 0] = p
+            yield Iterate(r.copy(), v, stage="interior point without friction")
+
+
+def has_no_friction(problem: FrictionProblem) -> bool:
+    """Whether it has contacts and all are Coulomb's with mu = 0."""
+    law = problem.law
+    return isinstance(law, Coulomb) and problem.contacts > 0 and not law.mu.any()
 
 
 @dataclass(frozen=True, eq=False)
@@ -59,20 +95,12 @@ def without_friction(problem: FrictionProblem, deadline: Deadline) -> Frictionle
     program = _Program.of(problem)
     if not program.load > 0:
         return None
-    n = program.M.shape[0]
-    cost = FILL * float(program.M.nnz) * float(n) ** 0.5
     try:
-        deadline.pay(cost)
-        at = program.first()
-        for _ in range(STEPS):
-            if program.is_solved(at):
-                break
-            deadline.pay(cost)
-            at = program.stepped(at)
+        *_, last = program.iterates(deadline)
     except SingularOperator:
         return None
-    v, p, _ = at
-    return Frictionless(p, v, program.balance(at)) if np.isfinite(p).all() else None
+    v, p, _ = last
+    return Frictionless(p, v, program.balance(last)) if np.isfinite(p).all() else None
 
 
 _Iterate = tuple[Array, Array, Array]  # v, p, s
@@ -97,6 +125,20 @@ class _Program:
         diagonal = M.diagonal()
         held = HELD * np.where(diagonal > 0, diagonal, float(diagonal.max(initial=0.0)))
         return cls(M, H[:, :: whole.dimension], whole.f, whole.w[:, 0], held)
+
+    def iterates(self, deadline: Deadline = NEVER) -> Iterator[_Iterate]:
+        """The first point and the steps from there, until one solves (1); pays the deadline."""
+        n = self.M.shape[0]
+        cost = FILL * float(self.M.nnz) * float(n) ** 0.5
+        deadline.pay(cost)
+        at = self.first()
+        yield at
+        for _ in range(STEPS):
+            if self.is_solved(at):
+                return
+            deadline.pay(cost)
+            at = self.stepped(at)
+            yield at
 
     @property
     def load(self) -> float:

@@ -1,0 +1,43 @@
+"""The interior point without friction, alone and as what `Auto` runs."""
+
+import numpy as np
+import pytest
+
+import amontons as am
+
+STONE = am.LinearElastic(10.0, 0.3, density=1.0)
+
+
+def wall(mu, aside=0.0):
+    """Three blocks, two of which contact alone holds."""
+    made = am.Wall(2, 1, size=(2.0, 1.0), cells=(4, 2), material=STONE)
+    return made.model([], [am.BodyForce((aside, -1.0))]).assemble().with_mu(mu)
+
+
+def test_auto_takes_it_where_nothing_holds_bodies():
+    """Weight of all blocks on the floor, the lower ones and the pressures of the law."""
+    problem = wall(0.0)
+    solution = am.solve(problem, tolerance=1e-9)
+    assert solution.convergence.detail == "interior point without friction"
+    assert solution.converged
+    assert not solution.r[:, 1].any()
+    alone = am.solve(problem, am.FrictionlessInteriorPoint(), tolerance=1e-9)
+    np.testing.assert_allclose(alone.r, solution.r, atol=1e-7)
+    weight = -problem.f[1::2].sum()
+    pressed = (problem.H @ solution.r.ravel())[1::2].sum()
+    assert pressed == pytest.approx(weight, rel=1e-8)
+
+
+def test_a_load_that_no_pressure_balances_ends_with_a_reason():
+    """Pushed aside on a floor without friction: no rest, whatever method."""
+    solution = am.solve(
+        wall(0.0, 0.5), am.FrictionlessInteriorPoint(), check=False, time_limit=20
+    )
+    assert not solution.converged
+    assert np.isfinite(solution.r).all()
+
+
+def test_friction_is_refused():
+    solution = am.solve(wall(0.3), am.FrictionlessInteriorPoint(), check=False)
+    assert not solution.converged
+    assert "friction" in solution.convergence.detail
