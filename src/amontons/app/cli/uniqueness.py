@@ -7,6 +7,7 @@ from collections.abc import Sequence
 import click
 
 from ...analysis.certificates.verdict import Uniqueness, Verdict
+from ...analysis.paths.diagram import Diagram
 from ...analysis.solutions.enumerate import Solutions
 from ...core.errors import InvalidInput
 from ...io.certificates import check_certificate, write_certificate
@@ -48,12 +49,16 @@ def run(
 
 
 def deliver_certificate(
-    target: Model | FrictionProblem, found: Uniqueness | Solutions, path: str, err: bool
-) -> bool:
-    """Write what proves an answer and say so, err: on stderr; False where nothing does."""
+    target: Model | FrictionProblem, found: Uniqueness | Solutions | Diagram, path: str,
+    err: bool, *, end: FrictionProblem | None = None,
+) -> bool:  # fmt: skip
+    """Write what proves an answer and say so, err: on stderr; False where nothing does.
+
+    end: the problem at the other end of a diagram.
+    """
     problem = target if isinstance(target, FrictionProblem) else target.assemble()
     try:
-        claim = write_certificate(problem, found, path)
+        claim = write_certificate(problem, found, path, end=end)
     except InvalidInput as reason:  # the answer stands
         click.echo(f"No certificate was written: {reason}", err=True)
         return False
