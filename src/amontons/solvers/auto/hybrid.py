@@ -231,8 +231,13 @@ def _worth_multigrid(problem: FrictionProblem) -> bool:
 
 
 def _is_loose_without_friction(problem: FrictionProblem) -> bool:
-    """True where neither M nor friction holds a body, and a factor of M is no great matter."""
+    """True where neither M nor friction holds a body, and a factor of M is no great matter.
+
+    Without a mesh that factor comes first: modes of many bodies would take longer.
+    """
     if problem.unknowns > FACTORED or not has_no_friction(problem):
+        return False
+    if not _is_mesh(problem) and _regular(problem):
         return False
     return problem.matrices.loose_modes.shape[1] > 0
 
