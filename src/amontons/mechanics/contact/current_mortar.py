@@ -95,6 +95,11 @@ class MortarPair:
     axes: sparse.csr_array | None = None
     areas: Array | None = None
 
+    @cached_property
+    def both(self) -> Skin:
+        """Both sides as one, which may share middles."""
+        return Skin.joined([self.slave, self.master])
+
     @property
     def around(self) -> tuple[Skin, Mask]:
         """The facets whose areas make the normals, and of which of their nodes, (f, a)."""
@@ -234,8 +239,7 @@ class MortarMeeting:
     @cached_property
     def bulges(self) -> sparse.csr_array:
         """Bulges of middles of both sides by positions, (nodes, nodes)."""
-        both = Skin.joined([self.pair.slave, self.pair.master])  # which may share middles
-        return both.bulges(len(self.x))
+        return self.pair.both.bulges(len(self.x))
 
     @cached_property
     def passed(self) -> Array:

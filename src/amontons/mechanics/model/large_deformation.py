@@ -140,9 +140,10 @@ class LargeDeformation(NonlinearProblem):
 
     def _balanced(self, u: Array, meeting: Meetings) -> Array:
         """f_int - f, balanced (dofs,), at displacements u (nodes, d); the last one is kept."""
-        if not (self._kept and np.array_equal(self._kept[0], u)):
-            self._kept[:] = u.copy(), balanced(self.parts, meeting, self._needed(u))
-        return self._kept[1].copy()
+        kept = tuple(self._kept)  # other threads may put theirs
+        if not (kept and np.array_equal(kept[0], u)):
+            self._kept[:] = kept = u.copy(), balanced(self.parts, meeting, self._needed(u))
+        return kept[1].copy()
 
     def _point(
         self, u: Array, pieces: Pieces | None = None, needed: Array | None = None
@@ -179,8 +180,7 @@ class LargeDeformation(NonlinearProblem):
     ) -> Array:
         """F(v), (n,), unit of force, or the selection function of given pieces.
 
-        pressures: of hybrid cells, which are else those of v.  Raises InvertedCells where it
-        is not defined.
+        pressures: of hybrid cells, else those of v.  Raises InvertedCells where it has none.
         """
         u = self.displacement(v)
         needed = None if pressures is None else self._needed(u, pressures)
@@ -255,9 +255,8 @@ class LargeDeformation(NonlinearProblem):
         balance = float(np.linalg.norm(rest[self.parts.free]))
         if not self.contacts:
             return balance / load
-        meeting = self.parts.meet(self.displacement(v))
-        law = judge.scaled_residual(r, u, self._law_at(meeting), self.rho)
-        return max(balance / load, law / length)
+        law = self._law_at(self.parts.meet(self.displacement(v)))
+        return max(balance / load, judge.scaled_residual(r, u, law, self.rho) / length)
 
     def _sizes(self, v: Array, r: Array, u: Array, rest: Array) -> tuple[float, float]:
         """Sizes of the forces and of u, at least what rounding can resolve."""
@@ -323,14 +322,13 @@ class LargeDeformation(NonlinearProblem):
     def towards(self, share: float, goal: float, v: Array) -> FrictionProblem:
         """The tangent problem at a share and state v, under the load of another share."""
         now, then = self.at_share(share), self.at_share(goal)
-        tangent, displaced = now.linearised(v), now.displacement(v)
+        tangent, u = now.linearised(v), now.displacement(v)
         moved = then.prescribed - now.prescribed
-        blocks = now._needed_slopes(displaced)[1]
-        force = (then.load - now.load).at(displaced) - self.parts.matrix(blocks) @ moved
-        meeting, w = self.parts.meet(displaced), np.array(tangent.w)
-        across = meeting.relative(moved.reshape(displaced.shape))
-        w[:, 0] += (meeting.normals * across).sum(axis=1)
-        force, modes = force[self.parts.free], free_modes(self.parts, displaced)
+        blocks = now._needed_slopes(u)[1]
+        force = (then.load - now.load).at(u) - self.parts.matrix(blocks) @ moved
+        meeting, w = self.parts.meet(u), np.array(tangent.w)
+        w[:, 0] += (meeting.normals * meeting.relative(moved.reshape(u.shape))).sum(axis=1)
+        force, modes = force[self.parts.free], free_modes(self.parts, u)
         return replace(tangent, f=tangent.f + force, w=w, near_nullspace=modes, guess=v,
                        load_scale=max(tangent.load, float(np.linalg.norm(force))))  # fmt: skip
 
@@ -340,9 +338,8 @@ class LargeDeformation(NonlinearProblem):
 
     def closed_pieces(self, v: Array) -> list[Pieces]:
         """The active pieces with touching contacts stuck, then with all of them stuck."""
-        point = self.contact_point(v)
+        point, size = self.contact_point(v), np.ptp(self.parts.X, axis=0).max()
         loose = (point.pieces % 4 == 0) & point.meeting.met
-        size = np.ptp(self.parts.X, axis=0).max()
         return [np.where(loose & (point.meeting.gap <= limit), STICK, point.pieces)
                 for limit in (TOUCHING * size, np.inf)]  # fmt: skip
 

@@ -36,12 +36,16 @@ def unfaced_slaves(model: Model, fields: ContactFields) -> list[ResultWarning]:
     ]
 
 
+def _place(at: Array) -> str:
+    """In six digits, whatever the unit of length."""
+    return f"[{', '.join(f'{c:.6g}' for c in at)}]"
+
+
 def _warning(pair: MortarPair, x: Array) -> ResultWarning:
     slave, master = (
-        f"{name!r} reaches from {at.min(axis=0).round(6).tolist()} to "
-        f"{at.max(axis=0).round(6).tolist()}"
+        f"{name!r} reaches from {_place(at.min(axis=0))} to {_place(at.max(axis=0))}"
         for name, at in zip(
-            pair.names, (x[pair.slave.all], x[pair.master.all]), strict=False
+            pair.names, (x[pair.slave.all], x[pair.master.all]), strict=True
         )
     )
     return ResultWarning(
