@@ -75,8 +75,9 @@ def curves(W, q, mu, tree, y, x, k, t, r, span, distance, end=None, mu_end=None)
     need(off.max() * problem.to_r <= distance, "solutions are not that near")
     ends = [(low[chain, 0].min(), high[chain, 0].max()) for chain in found]
     lonely = sum(a > first and b < last for a, b in ends)
-    told = ", ".join(sorted(f"{np.floor(1e6 * max(a, first)) / 1e6:.6f} to "
-                            f"{np.ceil(1e6 * min(b, last)) / 1e6:.6f}" for a, b in ends))
+    ends = np.clip(ends, first, last) * 1e6
+    told = ", ".join(sorted(f"{np.floor(a) / 1e6:.6f} to {np.ceil(b) / 1e6:.6f}"
+                            for a, b in ends))  # fmt: skip
     span = " to ".join(np.format_float_positional(s, trim="-") for s in (first, last))
-    return (f"all loads from {span} between two: all solutions are within "
-            f"{upward(distance)} of {len(found)} curves ({told}), {lonely} with neither end")
+    near = f"all solutions are within {upward(distance)} of {len(found)} curves ({told})"
+    return f"all loads from {span} between two: {near}, {lonely} with neither end"
