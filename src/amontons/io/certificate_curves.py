@@ -6,7 +6,8 @@
     x, k        (tubes, n + 1) the centres of tubes, padded, and what they are parametrised by
     t, r        (s,), (s, nc, 3): one of every curve, or all solutions of one load
     span (2,)   the part of the time from 0, the load q and mu, to 1, `end` and `mu_end`
-    distance    within which solutions are of the lines of the tubes, unit of r
+    distance    within which solutions are of the lines of the tubes, or of r at one load,
+                unit of r
 
 The checker decides what holds: whatever it does not take is divided.  The y are those of
 `cone_exclusion`, the centres are found by Newton's method.
@@ -27,7 +28,7 @@ from ..analysis.statuses import SLIP, states_of
 from ..core.clock import Deadline
 from ..core.errors import InvalidInput
 from .certificate_checker.boxes import ARCS, Problem, divided
-from .certificate_checker.curves import chains
+from .certificate_checker.curves import chains, farthest
 from .certificate_checker.numbers import Refused
 from .certificate_checker.tubes import forms_of, tube
 
@@ -248,17 +249,19 @@ class _Tree:
             row[: len(c)] = c
         tubes = [held for *_, held in told if held is not None]
         sure, low, high, off = (np.array(a) for a in zip(*tubes, strict=True))
-        at = []
-        for chain in chains(low, high):
+        at, found = [], chains(low, high)
+        for chain in found:
             best = chain[np.argmax(sure[chain])]
             at.append((low[best] + high[best]) / 2)
         points = np.array(at)
+        one_load = self.root.box[2][0] == self.root.box[2][1]
+        far = farthest(low, high, found, at) if one_load else off.max()
         return {
             "tree": np.array([node.kind for node in nodes], dtype=np.int16),
             "y": np.array(y).reshape(-1, nc, 3), "x": x,
             "k": np.array([k for _, k, _ in told], dtype=np.int16),
             "t": points[:, 0], "r": (points[:, 1:] * to_r).reshape(-1, nc, 3),
-            "distance": np.array(ROOM * off.max() * to_r),
+            "distance": np.array(ROOM * far * to_r),
         }  # fmt: skip
 
 

@@ -40,22 +40,22 @@ def made():
 def answer(module, monkeypatch, build):
     """Put `build(path)` in the place of the process that compiles."""
 
-    def run(command, **options):
-        return build(Path(command[2]), command, options)
+    def run(command, limit):
+        return build(Path(command[2]), command, limit)
 
-    monkeypatch.setattr(module.subprocess, "run", run)
+    monkeypatch.setattr(module, "finished", run)
 
 
-def fails(path, command, options):
+def fails(path, command, limit):
     return subprocess.CompletedProcess(command, 1, "", "Traceback\nOSError: no room left\n")
 
 
-def hangs(path, command, options):
-    assert 60 < options["timeout"] < 3600
-    raise subprocess.TimeoutExpired(command, options["timeout"])
+def hangs(path, command, limit):
+    assert 60 < limit < 3600
+    raise subprocess.TimeoutExpired(command, limit)
 
 
-def is_missing(path, command, options):
+def is_missing(path, command, limit):
     raise FileNotFoundError("no python")
 
 
@@ -82,7 +82,7 @@ def test_where_compiling_fails_the_wheel_is_a_pure_one_that_says_why(
 def test_where_it_succeeds_the_wheel_is_one_of_this_platform(made, monkeypatch):
     module, hook, app = made
 
-    def succeeds(path, command, options):
+    def succeeds(path, command, limit):
         path.write_bytes(START)
         return subprocess.CompletedProcess(command, 0, "", "")
 

@@ -16,6 +16,7 @@ from amontons.app.cli import main
 from amontons.core.errors import InvalidInput
 from amontons.io import certificate_checker as checker
 from amontons.io.certificate_checker.boxes import ARCS, Problem
+from amontons.io.certificate_checker.curves import farthest
 from amontons.io.certificate_checker.numbers import positive_definite
 from amontons.mechanics.ready.hild import hild_triangle
 
@@ -343,6 +344,35 @@ def test_branches_over_the_load_are_proved_and_forged_ones_found(tmp_path):
         am.write_certificate(start, found, path)
 
 
+def tiny():
+    """Contact 2 of W = 1e-20 takes r_N = 1e20: y = -1e-310 there and y W = 0, as is rounded."""
+    W, q = np.diag([1.0, 1.0, 1e-20, 1e-20]), np.array([[-1.0, 0.0], [-1.0, 0.0]])
+    y = np.array([[[0.0, 0.0], [-1e-310, 0.0]]])
+    none = np.zeros((0, 2, 2))
+    return {"W": W, "q": q, "mu": np.full(2, 0.5), "patterns": np.array([b".."]), "y": y,
+            "left": np.array([], dtype="S"), "r": none, "distance": np.array(1.0)}  # fmt: skip
+
+
+def test_products_that_vanish_prove_nothing():
+    with pytest.raises(checker.Refused, match="not excluded"):
+        checker.proves("all solutions", tiny())
+
+
+@pytest.mark.parametrize("name", ["W", "q", "mu", "y", "distance"])
+def test_numbers_of_another_precision_prove_nothing(name):
+    data = tiny()
+    for kind in (np.float32, np.longdouble, complex, np.int64):
+        with pytest.raises(checker.Refused, match="precision"):
+            checker.proves("all solutions", {**data, name: data[name].astype(kind)})
+
+
+def test_units_that_lose_digits_prove_nothing():
+    for name, size in (("W", 1e-99), ("q", 1e100), ("mu", 1e-110)):
+        data = tiny()
+        with pytest.raises(checker.Refused, match="too small or large"):
+            checker.proves("all solutions", {**data, name: data[name] * size})
+
+
 def test_the_command_line_writes_a_list_and_checks_it(tmp_path):
     path = str(tmp_path / "c.h5")
     run = CliRunner().invoke
@@ -421,6 +451,14 @@ def test_all_solutions_of_a_load_in_space_are_proved(tmp_path):
     with h5py.File(tmp_path / "c.h5") as file:
         for r in file["r"][()]:
             assert min(np.abs(r - s.r).max() for s in found.solutions) <= file["distance"][()]
+        distance = float(file["distance"][()])
+    assert f"{1.0501 * distance:.1e}" in am.check_certificate(tmp_path / "c.h5")  # upwards
+
+
+def test_what_is_listed_is_near_all_of_its_chain():
+    """Not only near the middle of its own tube: at one end of it, and beside another."""
+    low, high = np.array([[0.0, 0.0], [0.0, 1.0]]), np.array([[0.0, 1.0], [0.0, 1.5]])
+    assert farthest(low, high, [np.array([0, 1])], [np.zeros(2)]) >= 1.5
 
 
 def test_boxes_that_hold_a_solution_are_never_excluded():
@@ -442,6 +480,13 @@ def test_boxes_that_hold_a_solution_are_never_excluded():
             y[:, [x != "l" for x in letters], 1:] = 0.0
             boxes = [(letters, (arc, ARCS[0]), (0.0, 0.0))] * 500
             assert not checked.excluded(boxes, y).any()
+
+
+def test_tiny_multipliers_exclude_no_solution_in_space():
+    W, q = np.diag([1.0] * 3 + [1e-20] * 3), np.array([[-1.0, 0, 0], [-1.0, 0, 0]])
+    box, y = ("cc", (ARCS[0],) * 2, (0.0, 0.0)), np.zeros((1, 2, 3))
+    y[0, 1, 0] = -1e-310
+    assert not Problem(W, q, np.full(2, 0.5)).excluded([box], y).any()
 
 
 def test_the_command_line_proves_diagrams(tmp_path, monkeypatch):

@@ -12,8 +12,9 @@ form with W and V exchanged, as L is symmetric:
     x = x_0 + W z,     (V^T M W + L) z = V^T (v~ + H u~ - M x_0),   H_c^T x_0 = -r~,
 
 and forces H_c^T p = M x - v~ - H u~ at the nodes tell y: (r~ + H^T x)_T of what slides, -p
-of what is held.  GMRES ends at a residual of TOLERANCE; its preconditioner is one cycle of
-the coarse levels that contact multigrid makes at these statuses, and a smoother after it.
+of what is held.  GMRES ends at a residual of TOLERANCE, told by the product M x that p needs
+as well; its preconditioner is one cycle of the coarse levels that contact multigrid makes at
+these statuses, and a smoother after it.
 """
 
 from __future__ import annotations
@@ -26,6 +27,8 @@ from numpy.typing import NDArray
 
 from ...core.errors import SingularOperator
 from ...linear.blocks import spatial
+from ...linear.some_rows import residual_rows
+from ...linear.vectors import norm
 from ...problem.law.law import TRESCA
 from ...problem.law.states import ContactStatus
 from ...solvers.contract import Breakdown
@@ -38,6 +41,7 @@ from .systems import SINGULAR, Adjoint, Change, GlobalSystem, System
 
 Array = NDArray[np.float64]
 TOLERANCE = 1e-9  # residual, relative to the load, at which an iteration ends
+ROUNDED = 1e-6  # the most at which it may end where rounding stops it
 RESTART = 30  # vectors that GMRES keeps
 MOST = 200  # cycles before it gives up
 JACOBI = 0.7  # of block Jacobi at the contact nodes, which are neighbours
@@ -99,9 +103,8 @@ class CycleSystem(System):
         start = self._held(spatial(h))
         force = f.copy()
         force[node] += np.einsum("cai,ci->ca", self.contacts.H[:, :, 1:], spatial(c)[:, 1:])
-        x = self._solved(force, start, transposed=False)
-        rest = self._product(x) - f
-        r = np.einsum("cia,ca->ci", self.back, rest[node])
+        x, product = self._solved(force, start, transposed=False)
+        r = np.einsum("cia,ca->ci", self.back, product[node] - f[node])
         u = np.einsum("cai,ca->ci", self.contacts.H, x[node])
         d = self.at.problem.dimension
         return Change(r[:, :d] * self._reacts, u[:, :d] + h, levels.displacement(x))
@@ -115,8 +118,8 @@ class CycleSystem(System):
         load = np.zeros(at.problem.unknowns) if v is None else v
         f = nodes.spread(levels.basis.to_load(load))
         f[node] += np.einsum("cai,ci->ca", self.contacts.H, spatial(u))
-        x = self._solved(f, self._held(spatial(r)), transposed=True)
-        p = np.einsum("cia,ca->ci", self.back, (self._product(x) - f)[node])[:, :d]
+        x, product = self._solved(f, self._held(spatial(r)), transposed=True)
+        p = np.einsum("cia,ca->ci", self.back, product[node] - f[node])[:, :d]
         s = np.einsum("cai,ca->ci", self.contacts.H, x[node])[:, :d] + r
         by_r = np.einsum("kii->ki", at.A) != 0  # A^T y = s where these rows are alone
         y = np.where(by_r, s, -p)
@@ -146,23 +149,15 @@ class CycleSystem(System):
         return out
 
     # ---------------------------------------------------------------- linear algebra
-    def _product(self, x: Array) -> Array:
-        out = np.empty_like(x)
-        self.levels.hierarchy.levels[0].A.times(x, out)
-        return out
-
-    def _solved(self, force: Array, start: Array, *, transposed: bool) -> Array:
+    def _solved(self, force: Array, start: Array, *, transposed: bool) -> tuple[Array, Array]:
+        """x = start + V z, or W z, of the module's equation for z, and M x."""
         trial = self.W if transposed else self.V
         if transposed not in self.cycles:
             test = self.V if transposed else self.W
             self.cycles[transposed] = _Cycle(self.levels, self.contacts, trial, test, self.L)
-        cycle, node = self.cycles[transposed], self.contacts.node
-        b = force - self._product(start) if start.any() else force.copy()
-        b[node] = np.einsum("cab,ca->cb", cycle.test, b[node])
-        z, count = _gmres(cycle, b, float(np.linalg.norm(force)))
+        x, product, count = _gmres(self.cycles[transposed], force, start)
         self.iterations += count
-        z[node] = np.einsum("cab,cb->ca", trial, z[node])
-        return start + z
+        return x, product
 
 
 class _Cycle:
@@ -179,11 +174,21 @@ class _Cycle:
         self.tangent = Tangent(levels.truncation)
         self.tangent.begin(0, contacts)
         self.tangent.renew(trial, test, L, turned=0.0)
-        rows = self.finest.A.rows(self.node)
-        own = np.linalg.inv(rows.inverse)
+        own = np.linalg.inv(contacts.inverse)
         block = np.einsum("cab,cad,cde->cbe", test, own, trial) + L
         self.inverse = np.linalg.pinv(block, rcond=1e-12)
         self.work = np.zeros((self.finest.A.nodes, 3))
+        self.nothing = np.zeros_like(self.work)
+
+    def residual(self, force: Array, product: Array, own: Array) -> Array:
+        """W^T (force - M x) - L own at the contact nodes, force - M x elsewhere; product: M x.
+
+        own (nc, 3): z of the contact nodes.
+        """
+        out = force - product
+        out[self.node] = np.einsum("cab,ca->cb", self.test, out[self.node])
+        out[self.node] -= np.einsum("cab,cb->ca", self.L, own)
+        return out
 
     def times(self, x: Array, out: Array) -> None:
         """out = A x, x free in the directions of the trial space alone, and given back."""
@@ -195,12 +200,13 @@ class _Cycle:
             "cab,cb->ca", self.L, own
         )
 
-    def apply(self, b: Array) -> Array:
-        """What one cycle makes of zero for A x = b: coarse levels first, then a smoother."""
-        P = self.finest.P
+    def apply(self, b: Array, z: Array) -> None:
+        """z: what a cycle makes of zero for A x = b: coarse levels first, then a smoother."""
+        P, levels = self.finest.P, self.tangent.hierarchy
         if P is None:
-            return self.tangent.solve(b)
-        z, levels = np.zeros_like(b), self.tangent.hierarchy
+            z[:] = self.tangent.solve(b)
+            return
+        z[:] = 0.0
         coarse = levels.levels[1].work
         self.work[:] = b
         P.restrict(self.work, coarse.b)
@@ -214,69 +220,75 @@ class _Cycle:
             self.finest.A.smooth(b, z, self.held, True)
         z[self.node] = own
         self._relax(b, z)
-        return z
 
     def _relax(self, b: Array, z: Array) -> None:
         """A step of block Jacobi at the contact nodes."""
         node, own = self.node, z[self.node].copy()
         z[node] = np.einsum("cab,cb->ca", self.trial, own)
-        indptr, indices, data = self.contacts.rows
-        product = np.einsum("eab,eb->ea", data, z[indices])
-        force = np.add.reduceat(product, indptr[:-1], axis=0)
-        rest = b[node] - np.einsum("cab,ca->cb", self.test, force)
+        residual_rows(node, *self.contacts.rows, z, self.nothing, self.work)  # - M z
+        rest = b[node] + np.einsum("cab,ca->cb", self.test, self.work[node])
         rest -= np.einsum("cab,cb->ca", self.L, own)
         z[node] = own + JACOBI * np.einsum("cab,cb->ca", self.inverse, rest)
 
 
-def _gmres(cycle: _Cycle, b: Array, size: float) -> tuple[Array, int]:
-    """(x, cycles) with |b - A x| <= TOLERANCE size, right preconditioned.
+def _gmres(cycle: _Cycle, force: Array, start: Array) -> tuple[Array, Array, int]:
+    """(x, M x, cycles) of x = start + trial z, right preconditioned.
 
-    Raises SingularOperator where it does not come to that.
+    The residual is that of M x as it is, at most TOLERANCE of the larger of |force| and the
+    first residual; where rounding of M x keeps it above that, at most ROUNDED.  Raises
+    SingularOperator where it does not come to that.
     """
-    x, r, count = np.zeros_like(b), b.copy(), 0
-    size = max(size, float(np.linalg.norm(b)))
-    product = np.empty_like(b)
-    while True:
-        beta = float(np.linalg.norm(r))
-        if beta <= TOLERANCE * size:
-            return x, count
+    node, x, product = cycle.node, start.copy(), np.zeros_like(force)
+    own, count = np.zeros((len(node), 3)), 0
+    if start.any():
+        cycle.finest.A.times(start, product)
+    r = cycle.residual(force, product, own)
+    beta = norm(r)
+    size, before, rest = max(norm(force), beta), np.inf, np.inf
+    goal = TOLERANCE * size
+    while not beta <= goal:  # nor where it is not a number
+        if rest <= goal and 0.5 * before < beta <= ROUNDED * size:  # GMRES sees no more of it
+            break
         if count >= MOST or not np.isfinite(beta):
             raise SingularOperator(
-                f"{SINGULAR}; {count} multigrid cycles left a residual of {beta / size:.1e}"
+                f"{SINGULAR}; {count} multigrid cycles left a residual of "
+                f"{beta / size:.1e}"
             )
-        step, more, rest = _arnoldi(cycle, r, beta, TOLERANCE * size)
-        x += step
+        z, more, rest = _arnoldi(cycle, r, beta, goal)
         count += more
-        if rest <= TOLERANCE * size:
-            return x, count
-        cycle.times(x, product)
-        np.subtract(b, product, out=r)
+        own += z[node]
+        z[node] = np.einsum("cab,cb->ca", cycle.trial, z[node])
+        x += z
+        cycle.finest.A.times(x, product)
+        r = cycle.residual(force, product, own)
+        before, beta = beta, norm(r)
+    return x, product, count
 
 
 def _arnoldi(
     cycle: _Cycle, r: Array, beta: float, goal: float
 ) -> tuple[Array, int, float]:
-    """(change of x, cycles, residual) of one restart of GMRES."""
-    shape, basis, made = r.shape, [r.ravel() / beta], []
-    H = np.zeros((RESTART + 1, RESTART))
-    k, rest, y = 0, beta, np.zeros(0)
-    w = np.empty(shape)
+    """(change of z, cycles, residual by the recurrence) of one restart of GMRES.
+
+    Gram-Schmidt is the classical one, two products with the whole basis: what it loses of
+    orthogonality, the next residual tells.
+    """
+    shape, n = r.shape, r.size
+    basis, made = np.empty((RESTART + 1, n)), np.empty((RESTART, n))
+    basis[0] = r.ravel() / beta
+    H, e = np.zeros((RESTART + 1, RESTART)), np.zeros(RESTART + 1)
+    e[0], k, y, rest = beta, 0, np.zeros(0), beta
     for k in range(RESTART):
-        made.append(cycle.apply(basis[k].reshape(shape)))
-        cycle.times(made[k], w)
-        flat = w.ravel()
-        for j, q in enumerate(basis):  # modified Gram-Schmidt
-            H[j, k] = q @ flat
-            flat -= H[j, k] * q
-        H[k + 1, k] = np.linalg.norm(flat)
-        e = np.zeros(k + 2)
-        e[0] = beta
-        y = np.linalg.lstsq(H[: k + 2, : k + 1], e, rcond=None)[0]
-        rest = float(np.linalg.norm(H[: k + 2, : k + 1] @ y - e))
+        w = basis[k + 1]
+        cycle.apply(basis[k].reshape(shape), made[k].reshape(shape))
+        cycle.times(made[k].reshape(shape), w.reshape(shape))
+        H[: k + 1, k] = basis[: k + 1] @ w
+        w -= H[: k + 1, k] @ basis[: k + 1]
+        H[k + 1, k] = norm(w)
+        part = H[: k + 2, : k + 1]
+        y = np.linalg.lstsq(part, e[: k + 2], rcond=None)[0]
+        rest = float(np.linalg.norm(part @ y - e[: k + 2]))
         if rest <= goal or not H[k + 1, k] > 0 or not np.isfinite(rest):
             break
-        basis.append(flat / H[k + 1, k])
-    step = np.zeros(shape)
-    for value, z in zip(y, made, strict=False):
-        step += value * z
-    return step, k + 1, rest
+        w /= H[k + 1, k]
+    return (y @ made[: k + 1]).reshape(shape), k + 1, rest

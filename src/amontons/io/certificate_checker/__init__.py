@@ -13,25 +13,29 @@ import numpy as np
 from .contacts import about, every_load
 from .curves import curves
 from .lists import lines
-from .numbers import Refused, need
+from .numbers import Refused, need, upward
 from .patterns import tree
 
 __all__ = ["Refused", "check", "digest", "proves"]
+OTHERS = ("patterns", "statuses", "left", "tree", "k", "pinned")  # letters and whole numbers
 
 
 def proves(claim, data):
     """What arrays prove, in a sentence; raises Refused where they do not prove the claim."""
     W, q, mu = data["W"], data["q"], data["mu"]
-    (nc, d), real = q.shape, [x for x in data.values() if x.dtype.kind == "f"]
+    (nc, d), real = q.shape, [x for name, x in data.items() if name not in OTHERS]
     need(W.shape == (nc * d, nc * d) and mu.shape == (nc,) and d in (2, 3), "shapes differ")
+    need(all(x.dtype == float for x in real), "numbers of another precision")
     need(all(np.isfinite(x).all() for x in real) and (mu >= 0).all(), "bad numbers")
+    sizes = abs(np.array([*W.diagonal(), abs(W).max(), abs(q).max(), mu.max()]))
+    need(((sizes == 0) | (sizes > 1e-99) & (sizes < 1e99)).all(), "numbers too small or large")
     if claim == "every load":
         every_load(**data)
         return f"{nc} contacts: every load has exactly one solution."
     if claim == "this load":
         far = (about if "tau" in data else tree)(**data)
-        need(far <= data["distance"], f"solutions are only within {far:.1e} of r0")
-        return f"{nc} contacts: every solution of this load is within {far:.1e} of r0."
+        need(far <= data["distance"], f"solutions are only within {upward(far)} of r0")
+        return f"{nc} contacts: every solution of this load is within {upward(far)} of r0."
     need(claim in ("all solutions", "all branches"), f"unknown claim {claim!r}")
     return f"{nc} contacts: {(curves if 'tree' in data else lines)(**data)}."
 

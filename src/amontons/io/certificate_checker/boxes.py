@@ -9,7 +9,7 @@ that it allows reaches y.(W r + q) = y.u.
 import numpy as np
 
 from .lists import reach
-from .numbers import U, need
+from .numbers import TINY, U, need
 
 WIDE = 1e-12  # by which ranges are wider, relative: rounding of sums of bounds
 ARCS = [((1.0, 0.0), (0.0, 1.0)), ((0.0, 1.0), (-1.0, 0.0)),
@@ -47,6 +47,7 @@ class Problem:
         self.unit = 2.0 ** np.round(np.log2(abs(loads).max()))
         stiff = 2.0 ** np.round(np.log2(abs(W).max()))
         self.to_r, self.W, self.loads = self.unit / stiff, W / stiff, loads / self.unit
+        need((self.W.diagonal() > 1e-99).all(), "W is not definite, or too small")
         self.rubs, S = self.mus.any(axis=0), (self.W + self.W.T) / 2
         self.most = reach(S, self.loads, np.arange(len(W)) % 3 == 0) * (1 + 1e-9)
         fast = [max(reach(S, self.loads, s * row) for s in (1, -1)) for row in self.W]
@@ -64,8 +65,9 @@ class Problem:
         arcs, spans = np.array([box[1] for box in boxes]), np.array([box[2] for box in boxes])
         m, mus, slips, opened = len(self.W), self.mus, letters == "l", np.isin(letters, [*"f."])
         fine = ((y[:, :, 0] <= 0) | ~opened) & (np.isin(letters, [*"sl"]) | ~y[:, :, 1:].any(2))
+        fine &= abs(y).max(axis=2) < 1e30
         turned, size = np.einsum("kit,kiat->kia", y[:, :, 1:], arcs), abs(y[:, :, 1:]).sum(2)
-        lost = 1.5 * slips * self.fast * (np.maximum(turned.max(2), 0) + 8 * U * size)
+        lost = 1.5 * slips * self.fast * (np.maximum(turned.max(2), 0) + 8 * U * size + TINY)
         flat = y.reshape(len(y), m)
         g, terms = (x.reshape(y.shape) for x in (flat @ self.W, abs(flat) @ abs(self.W)))
         along, round_ = np.einsum("kit,kiat->kia", g[:, :, 1:], arcs), 8 * U * (m + 20)
@@ -77,11 +79,12 @@ class Problem:
         mu = [(1 - t)[:, None] * mus[0] + t[:, None] * mus[1] for t in spans.T]
         push = np.maximum(mu[0] * push, mu[1] * push) - g[:, :, 0]
         push += round_ * (terms[:, :, 0] + mus.sum(axis=0) * terms[:, :, 1:].sum(axis=2))
+        push += TINY * (1 + mus.sum(axis=0))
         lack = np.maximum(np.where(letters == "f", 0.0, push), 0).max(axis=1)
         right = flat @ self.loads.T, round_ * (abs(flat) @ abs(self.loads).sum(axis=0))
         least = np.min([(1 - t) * right[0][:, 0] + t * right[0][:, 1] for t in spans.T], axis=0)
         reached = (lack * self.most + lost.sum(axis=1)) * self.part(spans) * (1 + WIDE)
-        return fine.all(axis=1) & (least - right[1] > reached)
+        return fine.all(axis=1) & (least - right[1] > reached + TINY)
 
     def ranges(self, box):
         """(low, high) of x of all solutions in a box; an arc is within a quadrant."""

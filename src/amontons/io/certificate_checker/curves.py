@@ -6,8 +6,8 @@ is at most one curve of solutions near a line (`tubes`).  Tubes that touch are o
 
 import numpy as np
 
-from .boxes import ARCS, Problem, divided
-from .numbers import need
+from .boxes import ARCS, WIDE, Problem, divided
+from .numbers import need, upward
 from .tubes import SIZES, tube
 
 
@@ -25,6 +25,12 @@ def chains(low, high):
             new += [*j[met]]
         out.append(np.array(chain))
     return out
+
+
+def farthest(low, high, found, at):
+    """How far solutions of one load are from those that are listed, one (1 + m) of a chain."""
+    return (1 + WIDE) * max(np.maximum(high[chain] - one, one - low[chain])[:, 1:].max()
+                            for chain, one in zip(found, at, strict=True))  # fmt: skip
 
 
 def leaves(problem, tree, span):
@@ -50,6 +56,7 @@ def curves(W, q, mu, tree, y, x, k, t, r, span, distance, end=None, mu_end=None)
     need(0 <= first <= last <= (0 if end is None else 1), "no span of time")
     out, rest = leaves(problem, tree, (first, last))
     need(len(y) == len(out) and len(x) == len(k) == len(rest), "no tree")
+    need(t.shape == (len(r),) and r.shape[1:] == q.shape and not distance.shape, "no list")
     for j in range(0, len(y), 1000):
         need(problem.excluded(out[j : j + 1000], y[j : j + 1000]).all(), "a box is left")
     tubes = [tube(problem, box, c[: 1 + sum(SIZES[x] for x in box[0])], int(j))
@@ -61,11 +68,16 @@ def curves(W, q, mu, tree, y, x, k, t, r, span, distance, end=None, mu_end=None)
     beside = [((low[chain] <= at[:, None]) & (at[:, None] <= high[chain])).all(2).any(1)
               for chain in found]  # fmt: skip
     need(len(at) == len(found) and (np.sum(beside, axis=1) == 1).all(), "another list")
-    need(off.max() * problem.to_r <= distance, "solutions are not that near")
     if end is None:
-        return f"this load: all solutions are within {distance:.1e} of {len(found)}"
+        far = farthest(low, high, found, [at[np.argmax(one)] for one in beside])
+        need(far * problem.to_r <= distance, "solutions are not that near")
+        return f"this load: all solutions are within {upward(distance)} of {len(found)}"
+    need(off.max() * problem.to_r <= distance, "solutions are not that near")
     ends = [(low[chain, 0].min(), high[chain, 0].max()) for chain in found]
     lonely = sum(a > first and b < last for a, b in ends)
-    told = ", ".join(sorted(f"{max(a, first):.6f} to {min(b, last):.6f}" for a, b in ends))
-    return (f"all loads from {first:g} to {last:g} between two: all solutions are within "
-            f"{distance:.1e} of {len(found)} curves ({told}), {lonely} with neither end")
+    ends = np.clip(ends, first, last) * 1e6
+    told = ", ".join(sorted(f"{np.floor(a) / 1e6:.6f} to {np.ceil(b) / 1e6:.6f}"
+                            for a, b in ends))  # fmt: skip
+    span = " to ".join(np.format_float_positional(s, trim="-") for s in (first, last))
+    near = f"all solutions are within {upward(distance)} of {len(found)} curves ({told})"
+    return f"all loads from {span} between two: {near}, {lonely} with neither end"

@@ -12,7 +12,7 @@ from fractions import Fraction
 
 import numpy as np
 
-from .numbers import Refused, U, exact, need, positive_definite
+from .numbers import TINY, Refused, U, exact, need, positive_definite
 from .patterns import covered
 
 ANY = np.inf
@@ -56,7 +56,9 @@ def reach(W, loads, g):
     for room in (1e-6, 1e-3, 1.0):
         b, k = most + room * size * load, size / load
         A = [np.block([[k * W, (k * q - g)[:, None] / 2], [(k * q - g) / 2, b]]) for q in loads]
-        if all(positive_definite(x, 8 * U * abs(x)) for x in A):
+        sizes = [np.block([[k * abs(W), (k * abs(q) + abs(g))[:, None] / 2],
+                           [(k * abs(q) + abs(g)) / 2, abs(b)]]) for q in loads]  # fmt: skip
+        if all(positive_definite(x, 8 * U * s) for x, s in zip(A, sizes, strict=True)):
             return b
     raise Refused("W is not definite: reactions are not bounded")
 
@@ -93,6 +95,7 @@ def excludes(W, loads, mu, words, y):
     right, margin = y @ loads.T, (abs(y) @ abs(loads).T).max(axis=1)
     margin += (size * np.maximum(abs(low), abs(high))).sum((1, 2))
     margin *= 4 * U * (len(W) + 20)
+    margin += TINY * (1 + (1 + mu.max()) * np.maximum(abs(low), abs(high)).sum((1, 2)))
     out = (right.min(axis=1) > most + margin) | (right.max(axis=1) < least - margin)
     return out | (low > high).any(axis=(1, 2))
 

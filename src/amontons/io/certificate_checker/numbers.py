@@ -14,6 +14,7 @@ from typing import Any
 import numpy as np
 
 U = 2.0**-53
+TINY = 1e-290  # above what products lose that are too small for floating point numbers
 exact = np.vectorize(Fraction, otypes=[object])
 
 
@@ -25,6 +26,11 @@ def need(holds, why):
     """Refuse where it does not hold."""
     if not holds:
         raise Refused(why)
+
+
+def upward(x):
+    """Two digits that are not below x >= 0."""
+    return f"{1.0501 * float(x):.1e}"
 
 
 def unit_scale(A):
@@ -96,6 +102,7 @@ def bound(W, V, size, R, off=None, q=None):
         turned = (v + v.transpose(0, 2, 1)) / 2 @ Z
         parts += [Z.reshape(-1, Z.shape[2]).T @ turned.reshape(-1, Z.shape[2]), Z]
     M, _, rounding, terms = parts
+    need(M.diagonal().min() > 1e-200, "a matrix is not definite, or too small")
     rounding, s = 2 * (3 * len(W) + 60) * U * rounding, unit_scale(M)
     off = np.zeros((nc, d)) if off is None else off
     sharp = not off.any()

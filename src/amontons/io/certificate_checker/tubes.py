@@ -12,7 +12,7 @@ Brouwer and Banach.
 import numpy as np
 
 from .boxes import WIDE
-from .numbers import U, need
+from .numbers import TINY, U, need
 
 SIZES, STEPS = {"f": 0, "o": 1, "s": 4, "l": 5}, 40  # numbers of a contact; steps of h
 
@@ -66,9 +66,9 @@ class Expansion:
         self.F, self.dF = at[0][:, 0] @ x, margin * (at[1][:, 1] @ abs(x))
         self.J, self.dJ = 2 * at[0][:, 0, :-1], 2 * margin * at[1][:, 1, :-1]
         self.Q, self.dQ = M[:, 0, :-1, :-1], margin * M[:, 1, :-1, :-1]
-        self.dF += margin * abs(self.F)
-        self.dJ += margin * abs(self.J)
-        self.dQ += margin * abs(self.Q)
+        self.dF += margin * abs(self.F) + TINY
+        self.dJ += margin * abs(self.J) + TINY
+        self.dQ += margin * abs(self.Q) + TINY
 
     def on_line(self, d, w, h, which):
         """Value, slope along d and what both are off by within w of a line, h of c."""
@@ -85,6 +85,7 @@ def tube(problem, box, c, k):
     low, high = problem.ranges(box)
     n, forms = len(low) - 1, forms_of(problem, box[0])
     need(c.shape == low.shape and 0 <= k <= n, "no centre")
+    need(max(abs(c).max(), abs(high).max()) < 1e30, "numbers are too large")
     at = Expansion(np.concatenate(forms), c, 4 * U * (4 * len(problem.W) + 40))
     slacks = slice(n, n + len(forms[1]))
     a, E, T, d = preconditioned(at, n, k)
@@ -120,7 +121,7 @@ def preconditioned(at, n, k):
     off[:, k] += d[others]
     a = abs(P @ at.F[:n]) + size @ at.dF[:n]
     T = abs(np.tensordot(P, at.Q[:n], 1)) + np.tensordot(size, at.dQ[:n], 1)
-    return a, abs(off) + size @ at.dJ[:n], T, d
+    return a + TINY, abs(off) + size @ at.dJ[:n] + TINY, T + TINY, d
 
 
 def part_of(lines, sign, h):
