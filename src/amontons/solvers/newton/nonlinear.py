@@ -231,7 +231,8 @@ class NonlinearNewton:
         tangent = whole if whole.law.varies else whole.plain  # with springs behind v
         start = Iterate(np.zeros((tangent.contacts, tangent.dimension)))
         try:
-            most = EARLY if tangent.gains_energy else CONTACT_STEPS
+            is_brief = tangent.gains_energy or not problem.meets_first  # another way is next
+            most = EARLY if is_brief else CONTACT_STEPS
             iterates = first_of(Auto().iterates(tangent, start, target), most)
             iterate = sent(iterates, None)
             while iterate is not None:
