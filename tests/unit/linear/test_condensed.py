@@ -102,7 +102,7 @@ def test_evolutions_are_the_same(monkeypatch):
     (r, v, steps), (again, moved, count) = ends
     assert np.abs(r - again).max() <= 1e-7 * np.abs(r).max()
     assert np.abs(v - moved).max() <= 1e-7 * np.abs(v).max()
-    assert count <= steps + 1
+    assert count <= steps + 2  # cycles predict to 1e-4
 
 
 def test_a_body_that_only_contact_holds(monkeypatch):

@@ -144,7 +144,7 @@ def test_a_body_without_supports_stands_on_its_springs():
         am.solve(loose)
 
 
-@pytest.mark.parametrize("method", METHODS)
+@pytest.mark.parametrize("method", sorted({*METHODS} - {"frictionless-interior-point"}))
 def test_all_solvers(method):
     model = block([0.03, -0.03], cells=2)
     expected = am.solve(model, tolerance=1e-11).solution
