@@ -14,7 +14,7 @@ from click.testing import CliRunner
 import amontons as am
 from amontons.analysis.certificates.uniqueness import Verdict
 from amontons.analysis.scaled import Scaled
-from amontons.analysis.solutions.existence import exist
+from amontons.analysis.solutions.existence import different, exist
 from amontons.analysis.solutions.multistart import Finder
 from amontons.app.cli import main
 from amontons.core.errors import AmontonsError
@@ -156,6 +156,30 @@ def test_a_friction_that_is_proved_is_reported():
     assert found.verdict is Verdict.UNIQUE_EVERY_LOAD
     assert found.lower > found.friction
     assert found.resolution == 0.0
+
+
+@pytest.mark.parametrize("d", [2, 3])
+def test_two_reactions_near_one_solution_are_no_two_solutions(d):
+    """However near; a contact with little force may seem to be open in one of them."""
+    W = np.eye(2 * d) + 0.1
+    r = np.zeros((2, d))
+    r[:, 0] = 1.0, 1e-9
+    problem = am.FrictionProblem.from_delassus(W, -(W @ r.ravel()).reshape(2, d), [2.0, 2.0])
+    for other in (r * [[1.0], [0.0]], r * (1 + 1e-10), r + 1e-10):
+        assert problem.error(other) < 1e-8
+        assert not exist(problem, [r, other])
+        assert different(problem, [r, other, r]) == [True, False, False]
+
+
+def test_solutions_are_known_no_better_than_rounding_leaves_them(benchmark):
+    """Of a nearly singular W: the exact solution is within the distance that is told."""
+    name, (W, q, mu) = benchmark.draw(1403, 2, 3)
+    assert name == "nearly singular"
+    (exact,) = benchmark.exact_oracle_discs.all_exact(W, q, mu).solutions
+    found = am.all_solutions(am.FrictionProblem.from_delassus(W, q, mu))
+    (one,) = found.solutions
+    off = np.abs(one.r.ravel() - exact.r).max() / np.abs(exact.r).max()
+    assert found.complete and off <= found.resolution < 1e-10
 
 
 @pytest.mark.parametrize("d", [2, 3])

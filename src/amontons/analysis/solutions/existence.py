@@ -13,6 +13,7 @@ variables" (1970), theorem 12.6.2.
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
@@ -21,7 +22,7 @@ from ...core.clock import NEVER, Deadline
 from ...problem.friction import FrictionProblem
 from ..scaled import Scaled
 from ..statuses import FREE, FRICTIONLESS, SLIP, STICK, states_of
-from ..tolerances import BELONGS, SEGMENT
+from ..tolerances import BELONGS, SAME, SEGMENT
 from .multistart import described, statuses
 from .newton_batch import jacobian, polished
 from .piece_solution import examined
@@ -35,10 +36,24 @@ WORK = (1e7, 10.0)  # operations of a proof, and per cube of the reactions
 LITTLE = 5e8  # operations that are always done: some ten milliseconds
 
 
+@dataclass(frozen=True, eq=False)
+class _Place:
+    """Where a solution is proved to be: scaled, within `off` of every entry of r (nc, d)."""
+
+    r: Array
+    off: float
+    is_set: bool = False
+
+    def is_apart_from(self, other: _Place) -> bool:
+        """Whether the two are of different solutions, or of a set of them."""
+        apart = float(np.abs(self.r - other.r).max(initial=0.0))
+        return self.is_set or other.is_set or apart > self.off + other.off
+
+
 def exist(
     problem: FrictionProblem | Scaled, reactions: Sequence[Array], deadline: Deadline = NEVER
 ) -> bool:
-    """True where each of some reactions (nc, d) surely belongs to a solution nearby.
+    """True where each of some reactions (nc, d) surely belongs to a solution of its own nearby.
 
     Also where they all are solutions within rounding, and everything between them.  False too
     where a proof would take longer than there is time; small ones are always looked at.
@@ -46,14 +61,34 @@ def exist(
     scaled = Scaled.of(problem)
     if takes_too_long(scaled, len(reactions), deadline):
         return False
-    deadline.spend(_work(scaled, len(reactions)))
     pairs = [(reactions[0], r) for r in reactions[1:]]
     if pairs and all(_on_segment(scaled, *pair) for pair in pairs):
+        deadline.spend(_work(scaled, len(reactions)))
         return True
-    if scaled.shape[1] == 3:
-        return all(_newton_converges(scaled, r / scaled.to_r) for r in reactions)
-    plane = PlaneProblem(scaled)
-    return all(_on_its_piece(plane, r / scaled.to_r) for r in reactions)
+    return all(different(scaled, reactions, deadline))
+
+
+def different(
+    problem: FrictionProblem | Scaled, reactions: Sequence[Array], deadline: Deadline = NEVER
+) -> list[bool]:
+    """Which reactions (nc, d) surely belong to solutions, other ones than those before them.
+
+    Two near ones may both belong to one solution between them.
+    """
+    scaled = Scaled.of(problem)
+    places: list[_Place] = []
+    out = []
+    for r in reactions:
+        place = None
+        if not takes_too_long(scaled, 1, deadline):
+            deadline.spend(_work(scaled, 1))
+            prove = _newton_converges if scaled.shape[1] == 3 else _on_its_piece
+            place = prove(scaled, r / scaled.to_r)
+        is_new = place is not None and all(place.is_apart_from(known) for known in places)
+        if place is not None and is_new:
+            places.append(place)
+        out.append(is_new)
+    return out
 
 
 def takes_too_long(local: Scaled, count: int, deadline: Deadline) -> bool:
@@ -67,33 +102,37 @@ def _work(local: Scaled, count: int) -> float:
 
 
 def _on_segment(scaled: Scaled, r: Array, other: Array) -> bool:
+    if np.abs(other - r).max(initial=0.0) <= SAME * np.abs(r).max(initial=0.0):
+        return False  # near any solution errors are small
     points = (r + t * (other - r) for t in (0.0, 0.25, 0.5, 0.75, 1.0))
     return all(scaled.problem.certain_error(point) <= SEGMENT for point in points)
 
 
-def _on_its_piece(plane: PlaneProblem, r: Array) -> bool:
+def _on_its_piece(scaled: Scaled, r: Array) -> _Place | None:
     """2D: the solution of a pattern that r has is inside of the piece."""
-    entry, mu = described(plane.scaled, r), plane.mu
+    plane = PlaneProblem(scaled)
+    entry, mu = described(scaled, r), plane.mu
     for word in (entry.pattern, *entry.touching)[:WORDS]:
         states = states_of(word)
         states[(mu == 0) & (states != FREE)] = FRICTIONLESS
         answer = examined(plane, states)
         near = np.abs(answer.r - r.ravel()).max() <= BELONGS * (1 + np.abs(r).max())
         if near and (answer.exists or answer.freedom):
-            return True
-    return False
+            off = float(answer.off_r.max(initial=0.0))
+            return _Place(answer.r.reshape(r.shape), off, answer.freedom > 0)
+    return None
 
 
-def _newton_converges(scaled: Scaled, r: Array) -> bool:
+def _newton_converges(scaled: Scaled, r: Array) -> _Place | None:
     """3D: the condition of Kantorovich, with statuses that do not change in the ball."""
     start = r
     r, step = polished(scaled, start)
     if np.abs(r - start).max(initial=0.0) > BELONGS * (1 + np.abs(start).max(initial=0.0)):
-        return False
+        return None
     u, size = scaled.velocity(r[None])[0], 1 + float(np.abs(r).max(initial=0.0))
     values = np.linalg.svd(jacobian(scaled, r), compute_uv=False)
     if not len(values) or values[-1] == 0:
-        return False
+        return None
     beta = np.sqrt(len(values)) / values[-1]
     eta = step + beta * ROUNDING * size * (1 + np.abs(scaled.W).sum(axis=1).max())
     states, mu = statuses(scaled, r)[0], scaled.mu
@@ -104,8 +143,8 @@ def _newton_converges(scaled: Scaled, r: Array) -> bool:
     slides = np.where(mu > 0, np.linalg.norm(u[:, 1:], axis=1), np.inf)
     margin = np.where(states == SLIP, np.minimum(r[:, 0], slides), margin)
     if (margin <= 4 * grows * eta).any():
-        return False
+        return None
     slip = (states == SLIP) & (mu > 0)
     reach = np.linalg.norm(r[slip, 1:] - u[slip, 1:], axis=1)
     curvature = float((8 * grows[slip] ** 2 / reach).max(initial=0.0))
-    return bool(beta * curvature * eta <= SAFE)
+    return _Place(r, 2 * eta) if beta * curvature * eta <= SAFE else None  # [Kantorovich]

@@ -22,9 +22,9 @@ from ...scaled import UNRESOLVED, Scaled
 from ...statuses import FREE, STICK
 from ...tolerances import ON, REFERENCE, RESOLVED, SOLVED
 from ..enumerate import Solutions, missing, searched
-from ..existence import exist
+from ..existence import different
 from ..multistart import EXTRA, ROUND, Finder, statuses
-from ..newton_batch import newton, on_piece, polished, solve_work, width
+from ..newton_batch import jacobian, newton, on_piece, polished, solve_work, width
 from ..region_tree import RegionTree
 from .multipliers import BoxProblem, BoxProof
 from .proof import DiscProof, box_of
@@ -58,10 +58,11 @@ def enumerate_discs(
         tree = DiscSearch(scaled, finder, deadline)
         tree.begin()
         tree.run()
-        entries = [replace(entry, distance=tree.resolution,
-                           at_least=int(exist(scaled, [entry.r], deadline)),
+        listed = list(finder.solutions())
+        proved = different(scaled, [entry.r for entry in listed], deadline)
+        entries = [replace(entry, distance=tree.resolution, at_least=int(is_proved),
                            sole=tree.complete and not (entry.freedom or entry.touching))
-                   for entry in finder.solutions()]  # fmt: skip
+                   for entry, is_proved in zip(listed, proved, strict=True)]  # fmt: skip
         return Solutions(
             tuple(entries), tree.complete, tree.reason, tree.examined,
             proof=tree.proof() if keep_proof else None, resolution=tree.resolution,
@@ -112,13 +113,19 @@ class DiscSearch(RegionTree):
         """How far another solution can be from one that is taken to be on a border, relative.
 
         A reference within ON of another status counts as having both.  What it is off by, other
-        solutions may be off by as much more as W is soft.
+        solutions may be off by as much more as W is soft.  No solution is known better than
+        rounding leaves it.
         """
+        if len(self.errors) < len(self.finder.found):
+            self._polish()
+        known = zip(self.errors, self.finder.found, strict=True)
+        own = max((max(e * (1 + float(np.abs(r).max(initial=0.0))), _rounding(self.scaled, r))
+                   for e, r in known), default=0.0)  # fmt: skip
         off = max((_off_border(self.scaled, r) for r in self.finder.found), default=0.0)
         if off > 0.0:
             softest = float(np.linalg.eigvalsh(self.scaled.symmetric)[0])
             off /= max(softest, np.finfo(float).tiny)
-        return self.scaled.relative(max(ON, off), *self.finder.found)
+        return self.scaled.relative(max(ON, off, own), *self.finder.found)
 
     @property
     def _missing(self) -> str | None:
@@ -333,6 +340,14 @@ class DiscSearch(RegionTree):
     def _known(self, r: Array) -> bool:
         size = 1 + np.abs(r).max()
         return any(np.abs(r - other).max() <= 10 * ON * size for other in self.finder.found)
+
+
+def _rounding(scaled: Scaled, r: Array) -> float:
+    """What rounding of W r + q may move a solution (nc, d) by, scaled."""
+    terms = np.abs(scaled.W) @ np.abs(r).ravel() + np.abs(scaled.q).ravel()
+    least = np.linalg.svd(jacobian(scaled, r), compute_uv=False).min(initial=np.inf)
+    float64 = np.finfo(float)
+    return float(float64.eps * terms.max(initial=0.0) / max(least, float64.tiny))
 
 
 def _off_border(scaled: Scaled, r: Array) -> float:
