@@ -72,7 +72,7 @@ def test_newton_steps_do_not_grow_with_contacts(cells):
     model = coming_down((cells, 6), (cells, 4))
     steps = list(am.evolve(model, am.QuasiStatic(0.5), until=1.5))
     counts = [step.solution.convergence.iterations for step in steps]
-    assert max(counts) <= 6
+    assert max(counts) <= 7
     assert min((step.state.force[:, 0] > 0).sum() for step in steps) >= cells / 5
 
 
