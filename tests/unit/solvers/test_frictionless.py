@@ -56,3 +56,12 @@ def test_friction_is_refused():
     solution = am.solve(wall(0.3), am.FrictionlessInteriorPoint(), check=False)
     assert not solution.converged
     assert "friction" in solution.convergence.detail
+
+
+def test_no_matrix_to_scale_steps_with_is_refused():
+    problem = am.FrictionProblem.from_global(
+        np.zeros((2, 2)), np.eye(2), [0.0, -1.0][::-1], np.zeros((1, 2)), [0.0]
+    )
+    solution = am.solve(problem, am.FrictionlessInteriorPoint(), check=False)
+    assert not solution.converged
+    assert "diagonal" in solution.convergence.detail

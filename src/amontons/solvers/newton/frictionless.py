@@ -61,6 +61,8 @@ class FrictionlessInteriorPoint:
         program = _Program.of(problem)
         if not program.load > 0:
             raise Breakdown("there is no load f")
+        if not program.held.all():
+            raise Breakdown("M has no positive entry on its diagonal")
         r = np.zeros((problem.contacts, problem.dimension))
         for v, p, _ in program.iterates(target.deadline):
             if not (np.isfinite(p).all() and np.isfinite(v).all()):
@@ -93,7 +95,7 @@ def without_friction(problem: FrictionProblem, deadline: Deadline) -> Frictionle
     if not problem.contacts:
         return None
     program = _Program.of(problem)
-    if not program.load > 0:
+    if not (program.load > 0 and program.held.all()):
         return None
     try:
         *_, last = program.iterates(deadline)
