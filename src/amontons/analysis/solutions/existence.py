@@ -76,14 +76,15 @@ def different(
     Two near ones may both belong to one solution between them.
     """
     scaled = Scaled.of(problem)
+    plane = PlaneProblem(scaled) if scaled.shape[1] == 2 else None
     places: list[_Place] = []
     out = []
     for r in reactions:
         place = None
         if not takes_too_long(scaled, 1, deadline):
             deadline.spend(_work(scaled, 1))
-            prove = _newton_converges if scaled.shape[1] == 3 else _on_its_piece
-            place = prove(scaled, r / scaled.to_r)
+            near = r / scaled.to_r
+            place = _on_its_piece(plane, near) if plane else _newton_converges(scaled, near)
         is_new = place is not None and all(place.is_apart_from(known) for known in places)
         if place is not None and is_new:
             places.append(place)
@@ -108,10 +109,9 @@ def _on_segment(scaled: Scaled, r: Array, other: Array) -> bool:
     return all(scaled.problem.certain_error(point) <= SEGMENT for point in points)
 
 
-def _on_its_piece(scaled: Scaled, r: Array) -> _Place | None:
+def _on_its_piece(plane: PlaneProblem, r: Array) -> _Place | None:
     """2D: the solution of a pattern that r has is inside of the piece."""
-    plane = PlaneProblem(scaled)
-    entry, mu = described(scaled, r), plane.mu
+    entry, mu = described(plane.scaled, r), plane.mu
     for word in (entry.pattern, *entry.touching)[:WORDS]:
         states = states_of(word)
         states[(mu == 0) & (states != FREE)] = FRICTIONLESS

@@ -60,12 +60,13 @@ def enumerate_discs(
         tree.run()
         listed = list(finder.solutions())
         proved = different(scaled, [entry.r for entry in listed], deadline)
-        entries = [replace(entry, distance=tree.resolution, at_least=int(is_proved),
-                           sole=tree.complete and not (entry.freedom or entry.touching))
+        complete, resolution = tree.complete, tree.resolution
+        entries = [replace(entry, distance=resolution, at_least=int(is_proved),
+                           sole=complete and not (entry.freedom or entry.touching))
                    for entry, is_proved in zip(listed, proved, strict=True)]  # fmt: skip
         return Solutions(
-            tuple(entries), tree.complete, tree.reason, tree.examined,
-            proof=tree.proof() if keep_proof else None, resolution=tree.resolution,
+            tuple(entries), complete, tree.reason, tree.examined,
+            proof=tree.proof() if keep_proof else None, resolution=resolution,
             unresolved=tree.unresolved,
         )  # fmt: skip
 
