@@ -15,12 +15,13 @@ from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.linalg import lapack
 
 from ....core.clock import NEVER, Deadline, TimeLimit, deadline_of
 from ....problem.friction import FrictionProblem
 from ...scaled import UNRESOLVED, Scaled
 from ...statuses import FREE, STICK
-from ...tolerances import ON, REFERENCE, RESOLVED, SOLVED
+from ...tolerances import ON, REFERENCE, RESOLVED, SAME, SOLVED
 from ..enumerate import Solutions, missing, searched
 from ..existence import different
 from ..multistart import EXTRA, ROUND, Finder, statuses
@@ -60,7 +61,7 @@ def enumerate_discs(
         tree.run()
         listed = list(finder.solutions())
         proved = different(scaled, [entry.r for entry in listed], deadline)
-        complete, resolution = tree.complete, tree.resolution
+        complete, resolution = tree.complete, tree.resolution if tree.is_small else SAME
         entries = [replace(entry, distance=resolution, at_least=int(is_proved),
                            sole=complete and not (entry.freedom or entry.touching))
                    for entry, is_proved in zip(listed, proved, strict=True)]  # fmt: skip
@@ -84,6 +85,11 @@ class DiscSearch(RegionTree):
         self.errors: list[float] = []
         if self._penetrates:
             self.queue.clear()
+
+    @property
+    def is_small(self) -> bool:
+        """True where regions are looked at; else solutions are those of `multistart`."""
+        return len(self.scaled.mu) <= LARGEST
 
     @property
     def several(self) -> bool:
@@ -154,7 +160,7 @@ class DiscSearch(RegionTree):
     @property
     def reason(self) -> str:
         """Why the list is complete, or why not."""
-        if self.stopped and len(self.scaled.mu) > LARGEST:
+        if self.stopped and not self.is_small:
             return f"more than {LARGEST} contacts: regions were not looked at"
         if self.stopped:
             return f"stopped after {self.deadline}"
@@ -176,7 +182,7 @@ class DiscSearch(RegionTree):
     @property
     def affords_step(self) -> bool:
         """True where there are time and memory to look at a region."""
-        return len(self.scaled.mu) <= LARGEST and super().affords_step
+        return self.is_small and super().affords_step
 
     def _polish(self) -> None:
         """Known solutions to the last digits; those that can not be are no references."""
@@ -344,11 +350,21 @@ class DiscSearch(RegionTree):
 
 
 def _rounding(scaled: Scaled, r: Array) -> float:
-    """What rounding of W r + q may move a solution (nc, d) by, scaled."""
+    """What rounding of W r + q may move a solution (nc, d) by, scaled: an estimate.
+
+    Norms of largest entries, that of the inverse estimated from its factors (LAPACK's gecon):
+    no more than one linear solve.
+    """
     terms = np.abs(scaled.W) @ np.abs(r).ravel() + np.abs(scaled.q).ravel()
-    least = np.linalg.svd(jacobian(scaled, r), compute_uv=False).min(initial=np.inf)
+    matrix = jacobian(scaled, r)
     float64 = np.finfo(float)
-    return float(float64.eps * terms.max(initial=0.0) / max(least, float64.tiny))
+    if not matrix.size:
+        return 0.0
+    norm = float(np.abs(matrix).sum(axis=1).max())
+    factors, _, _ = lapack.dgetrf(matrix)
+    reciprocal, _ = lapack.dgecon(factors, norm, norm="I")
+    inverse = 1.0 / max(reciprocal * norm, float64.tiny)
+    return float(float64.eps * terms.max(initial=0.0) * inverse)
 
 
 def _off_border(scaled: Scaled, r: Array) -> float:
