@@ -27,6 +27,8 @@ from typing import Any
 
 import numba
 from numba.core import config
+from numba.core.errors import NumbaError
+from numba.core.types import BooleanLiteral, IntegerLiteral, unliteral
 
 from .source_digest import PACKAGE, Stamp, as_imported, imported, sources
 
@@ -47,6 +49,8 @@ def njit(*, cache: bool = True, **options: Any) -> Callable[[Function], Function
             imported(function.__code__.co_filename)
         kind = _kind() if cache else None
         made = numba.njit(**options)(function)
+        if hasattr(made, "get_call_template"):
+            _compile_once(made)
         if kind and hasattr(made, "_cache"):
             made._cache = kind(function, _in_our_folder)
         elif cache and hasattr(made, "enable_caching"):  # not where numba is switched off
@@ -55,6 +59,29 @@ def njit(*, cache: bool = True, **options: Any) -> Callable[[Function], Function
         return made
 
     return decorate
+
+
+def _compile_once(made: Any) -> None:
+    """Let kernels that call this one compile it for integers, not for a constant first.
+
+    Of `count = 0` that grows later, numba takes the constant before it sees the integer: all
+    kernels that count is given to would be compiled twice, with all that these call.
+    """
+    ask = made.get_call_template
+
+    def get_call_template(args: Any, kws: Any) -> Any:
+        plain = tuple(map(_plain, args)), {name: _plain(kind) for name, kind in kws.items()}
+        if plain != (tuple(args), kws):
+            with suppress(NumbaError):  # what needs the constant gets it
+                return ask(*plain)
+        return ask(args, kws)
+
+    made.get_call_template = get_call_template
+
+
+def _plain(kind: Any) -> Any:
+    """The type of a constant; other types as they are."""
+    return unliteral(kind) if isinstance(kind, IntegerLiteral | BooleanLiteral) else kind
 
 
 @cache

@@ -8,6 +8,7 @@ from contextlib import contextmanager
 from pathlib import Path
 
 import numba
+import numpy as np
 import pytest
 from numba.core.registry import cpu_target
 
@@ -255,3 +256,31 @@ print(why_compiling(), sum(twice.stats.cache_misses.values()), twice.stats.cache
     assert list(Path(folder).glob("kernel*.nbi"))
     assert str(tmp_path / "there") in folder
     assert done.stderr == ""
+
+
+def test_what_counts_from_0_is_given_to_kernels_that_are_compiled_once():
+    @compiled.njit(cache=False)
+    def more(count, by):
+        return count + by
+
+    @compiled.njit(cache=False)
+    def counted(n):
+        count = 0
+        for k in range(n):
+            count = more(count, k)
+        return count
+
+    assert counted(4) == 6
+    assert len(more.signatures) == 1
+
+
+def test_kernels_that_need_a_constant_get_it():
+    @compiled.njit(cache=False)
+    def part(pair, k):
+        return pair[k]
+
+    @compiled.njit(cache=False)
+    def second(x):
+        return part((1, x), 1)
+
+    assert (second(np.ones(2)) == 1).all()
