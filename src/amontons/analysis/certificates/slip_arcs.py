@@ -23,8 +23,12 @@ from __future__ import annotations
 import math
 
 import numpy as np
+from numpy.typing import NDArray
 
 from ...core.compiled import njit
+from ...core.copies import copy_inplace
+
+Array = NDArray[np.float64]
 
 PROVED, FAILED, SMALL, STOPPED = 1, -1, 0, 2
 TINY = 1e-12  # of the size of a matrix, within which an entry counts as zero
@@ -153,8 +157,7 @@ def search_inplace(A, mu, middle, half, top, budget):
     SMALL: the box on top is too small to be divided.  STOPPED: budget is spent, call again.
     """
     k = len(mu)
-    M, L = np.zeros((2, k, k))
-    X = np.zeros((k, 2 * k))
+    M, L, X = np.zeros((k, k)), np.zeros((k, k)), np.zeros((k, 2 * k))
     rows = np.zeros(k, dtype=np.int64)
     point = np.zeros(2 * k)
     seen = 0
@@ -177,8 +180,8 @@ def search_inplace(A, mu, middle, half, top, budget):
                 widest, most = i, loss
         if width[widest] < LEAST or top == len(middle):
             return SMALL, top, seen
-        half[top] = width
-        middle[top] = here
+        copy_inplace(width, half[top])
+        copy_inplace(here, middle[top])
         for row in (top - 1, top):
             half[row, widest] /= 2
         middle[top - 1, widest] -= half[top, widest]
@@ -188,20 +191,17 @@ def search_inplace(A, mu, middle, half, top, budget):
 
 
 @njit(cache=True)
-def point_threshold(A, shape, angles, largest):
-    """(t, rho (k,)): the friction t shape from which on the criterion fails at these angles.
+def _first_failing_friction(A, shape, angles, largest, M):
+    """(t, part): the least t up to the largest with which a part (bits) of M fails; inf, 0.
 
-    rho >= 0 has M rho <= 0 on its entries that are not zero.  t is inf, and rho zero, where it
-    does not fail up to the largest.
+    M (k, k) becomes the matrix of t.
     """
     k = len(shape)
-    M, L = np.zeros((2, k, k))
-    X = np.zeros((k, 2 * k))
-    rows = np.zeros(k, dtype=np.int64)
-    rho, point = np.zeros(k), np.zeros(2 * k)
+    L, X = np.zeros((k, k)), np.zeros((k, 2 * k))
+    rows, point = np.zeros(k, dtype=np.int64), np.zeros(2 * k)
     fill_inplace(A, largest * shape, angles, point, M)
     if first_failing(M, L, X, rows) == 0:
-        return np.inf, rho
+        return np.inf, 0
     low, high = 1e-12 * largest, largest
     for _ in range(BISECTIONS):
         t = math.sqrt(low * high)
@@ -211,15 +211,25 @@ def point_threshold(A, shape, angles, largest):
         else:
             high = t
     fill_inplace(A, high * shape, angles, point, M)
-    part = first_failing(M, L, X, rows)
-    chosen = np.array([i for i in range(k) if part >> i & 1])
-    block = np.empty((len(chosen), len(chosen)))
-    for a in range(len(chosen)):
-        for b in range(len(chosen)):
-            block[a, b] = M[chosen[a], chosen[b]]
+    return high, first_failing(M, L, X, rows)
+
+
+def point_threshold(
+    A: Array, shape: Array, angles: Array, largest: float
+) -> tuple[float, Array]:
+    """(t, rho (k,)): the friction t shape from which on the criterion fails at these angles.
+
+    rho >= 0 has M rho <= 0 on its entries that are not zero.  t is inf, and rho zero, where it
+    does not fail up to the largest.
+    """
+    k = len(shape)
+    M, rho = np.zeros((k, k)), np.zeros(k)
+    t, part = _first_failing_friction(A, shape, angles, largest, M)
+    chosen = [i for i in range(k) if part >> i & 1]
     if len(chosen) == 1:
-        rho[chosen[0]] = 1.0
-        return high, rho
-    values = np.abs(np.linalg.inv(block)).sum(axis=1)  # the inverse is <= 0
-    rho[chosen] = values / values.max()
-    return high, rho
+        rho[chosen] = 1.0
+    elif chosen:
+        inverse = np.linalg.inv(M[np.ix_(chosen, chosen)])  # <= 0
+        values = np.abs(inverse).sum(axis=1)
+        rho[chosen] = values / values.max()
+    return t, rho

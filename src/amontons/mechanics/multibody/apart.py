@@ -21,6 +21,16 @@ def dot(a, b):
 
 
 @njit(cache=True, error_model="numpy")
+def cross(a, b):
+    """The product of two vectors (3,): numpy's takes seconds to compile."""
+    out = np.empty(3)
+    out[0] = a[1] * b[2] - a[2] * b[1]
+    out[1] = a[2] * b[0] - a[0] * b[2]
+    out[2] = a[0] * b[1] - a[1] * b[0]
+    return out
+
+
+@njit(cache=True, error_model="numpy")
 def face_apart(first_face, n, o, i, first_vertex, v, j):  # noqa: PLR0913
     """(distance, face) of the face of i from which j is farthest."""
     best, face = -np.inf, -1

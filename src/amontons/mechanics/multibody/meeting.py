@@ -19,7 +19,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...core.compiled import njit
-from .apart import boxes_apart, dot, edges_apart, face_apart
+from ...core.copies import copy_inplace
+from .apart import boxes_apart, cross, dot, edges_apart, face_apart
 from .bodies import GROUND, Packed
 
 Array = NDArray[np.float64]
@@ -74,7 +75,8 @@ def _placed(first_vertex, vertices, first_face, normals, offsets, x, R):  # noqa
     v, n, o = np.empty_like(vertices), np.empty_like(normals), np.empty_like(offsets)
     boxes = np.empty((len(x), 2, 3))
     for b in range(len(x)):
-        boxes[b, 0], boxes[b, 1] = np.inf, -np.inf
+        for i in range(3):
+            boxes[b, 0, i], boxes[b, 1, i] = np.inf, -np.inf
         for k in range(first_vertex[b], first_vertex[b + 1]):
             for i in range(3):
                 v[k, i] = x[b, i]
@@ -205,7 +207,7 @@ def _ball_on(  # noqa: PLR0913
             for c in range(begin, end):
                 p = v[corners[c]]
                 q = v[corners[c + 1 if c + 1 < end else begin]]
-                side = np.cross(q - p, n[f])
+                side = cross(q - p, n[f])
                 if dot(side, foot - p) > 0:
                     within = False
                     edge = q - p
@@ -276,20 +278,21 @@ def _on_face(  # noqa: PLR0913
     marks, kept = np.empty(room, np.int64), np.empty(room, np.int64)
     size = 0
     for c in range(first_corner[against], first_corner[against + 1]):
-        polygon[size] = v[corners[c]]
+        copy_inplace(v[corners[c]], polygon[size])
         marks[size] = corners[c] - first_vertex[j]
         size += 1
     for c in range(begin, end):
         p = v[corners[c]]
         q = v[corners[c + 1 if c + 1 < end else begin]]
-        out = np.cross(q - p, normal)
+        out = cross(q - p, normal)
         out = out / np.sqrt(dot(out, out))
         number, side = 0, PLACES // 4 + 256 * (c - begin)
         for k in range(size):
             a, b = polygon[k], polygon[k + 1 if k + 1 < size else 0]
             da, db = dot(out, a - p), dot(out, b - p)
             if da <= 0 and number < room:
-                cut[number], kept[number] = a, marks[k]
+                copy_inplace(a, cut[number])
+                kept[number] = marks[k]
                 number += 1
             if (da < 0) != (db < 0) and da != db and da != 0 and db != 0 and number < room:
                 t = da / (da - db)
