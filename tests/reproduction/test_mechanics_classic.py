@@ -5,6 +5,7 @@ NAFEMS benchmark CGS-4, sliding wedge.
 """
 
 from dataclasses import replace
+from functools import cache
 
 import numpy as np
 import pytest
@@ -116,6 +117,7 @@ def test_cattaneo_mindlin_stick_zone():
     problem = model.assemble()
     along = model.recover(pressed).frames[:, 1, 0]
 
+    @cache
     def sheared(shift):
         w = np.array(problem.w)
         w[:, 1] -= pressed.u[:, 1] + shift * along  # slip counts from the pressed state
@@ -125,7 +127,7 @@ def test_cattaneo_mindlin_stick_zone():
         shear, load = np.abs(model.recover(solution).resultant)
         return shear / (mu * load)
 
-    shift = brentq(lambda s: ratio(sheared(s)) - 0.5, 1e-4, 0.02, xtol=1e-5)
+    shift = brentq(lambda s: ratio(sheared(s)) - 0.5, 1e-4, 0.02, xtol=1e-4)
     solution = sheared(shift)
     assert ratio(solution) == pytest.approx(0.5, abs=0.01)
     order = np.argsort(model.recover(solution).points[:, 0])

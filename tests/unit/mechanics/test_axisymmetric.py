@@ -126,7 +126,8 @@ def test_press_fit_with_poissons_effect():
 @pytest.mark.parametrize("order", [1, 2])
 def test_hertz_sphere_on_a_plane(order, method):
     """F = 4/3 E* sqrt(R) d^1.5, and the peak 3 F / (2 pi a^2) with a^3 = 3 F R / (4 E*)."""
-    law, R, depth, far, n = am.LinearElastic(1000.0, 0.3), 10.0, 0.02, 100, 20
+    law, R, depth, far = am.LinearElastic(1000.0, 0.3), 10.0, 0.02, 100
+    n = 20 if order == 1 else 12
     grade = np.concatenate([np.linspace(0, 0.6, n + 1),
                             0.6 * (far / 0.6) ** (np.arange(1, n + 1) / n)])
     mesh = am.box((1, 1), (2 * n, 2 * n))

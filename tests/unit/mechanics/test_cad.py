@@ -11,6 +11,7 @@ from click.testing import CliRunner
 import amontons as am
 from amontons.app.cli import main
 from amontons.core.errors import FileFormatError, InvalidInput
+from amontons.mechanics.meshes import cad
 from amontons.mechanics.meshes.surfaces import facet_areas, nodal_normals
 
 occ = pytest.importorskip("netgen.occ")
@@ -83,8 +84,16 @@ def volume(mesh, region=None):
     return total / (6 if mesh.dim == 3 else 2)
 
 
-def test_block_from_step(part):
-    mesh = am.read_cad(part, 0.4)
+@pytest.fixture(scope="module")
+def block_read(tmp_path_factory):
+    """The mesh of a file of the block."""
+    path = tmp_path_factory.mktemp("part") / "part.step"
+    block().WriteStep(str(path))
+    return am.read_cad(path, 0.4)
+
+
+def test_block_from_step(block_read):
+    mesh = block_read
     assert mesh.regions == ("default",)
     assert set(mesh.surfaces) == {"face1", "face2", "face3", "face4", "bottom", "top"}
     assert volume(mesh) == pytest.approx(2, rel=1e-12)
@@ -96,9 +105,8 @@ def test_block_from_step(part):
     np.testing.assert_allclose(normals, np.tile([0.0, 0, -1], (len(nodes), 1)), atol=1e-12)
 
 
-def test_the_same_mesh_every_time(part):
-    first, second = am.read_cad(part, 0.4), am.read_cad(str(part), 0.4)
-    np.testing.assert_array_equal(first.points, second.points)
+def test_the_same_mesh_every_time(part, block_read):
+    np.testing.assert_array_equal(block_read.points, am.read_cad(str(part), 0.4).points)
 
 
 def test_smaller_size_gives_shorter_edges():
@@ -232,7 +240,9 @@ def test_faces_of_one_name_are_one_surface():
     assert area(am.mesh_shape(shape, 1), "skin") == pytest.approx(10)
 
 
-def test_names_given(part):
+def test_names_given(part, monkeypatch):
+    whole = am.mesh_shape(block(), 1)
+    monkeypatch.setattr(cad, "_read_apart", lambda *_: whole)  # files are read in other tests
     mesh = am.read_cad(part, 1, names={"face1": "side", "default": "steel", "top": "side"})
     assert mesh.regions == ("steel",)
     assert set(mesh.surfaces) == {"side", "face2", "face3", "face4", "bottom"}
@@ -434,13 +444,14 @@ def test_every_outer_face_is_numbered_once_and_inner_ones_are_not():
 def test_info_tells_which_faces_bond_and_how_to_open_them(tmp_path):
     path = tmp_path / "two.step"
     two_blocks().WriteStep(str(path))
-    data = json.loads(run("info", path, "--size", 0.5, "--json", "-").stdout)
+    told = tmp_path / "told.json"
+    said = run("info", path, "--size", 0.5, "--json", told).stdout
+    data = json.loads(told.read_text())
     bonds = [n for n, each in data["surfaces"].items() if each["between"]]
     assert len(bonds) == 1 and data["surfaces"][bonds[0]]["area"] == pytest.approx(1)
     assert data["surfaces"][bonds[0]]["between"] == ["steel", "copper"]
-    said = run("info", path, "--size", 0.5).stdout
     assert f"glue = {{ {bonds[0]} = false }}" in said and "--no-glue" in said
-    opened = am.read_cad(path, 0.5, glue={bonds[0]: False})
+    opened = am.mesh_shape(two_blocks(), 0.5, glue={bonds[0]: False})
     assert {f"{bonds[0]}-steel", f"{bonds[0]}-copper"} <= set(opened.surfaces)
 
 
