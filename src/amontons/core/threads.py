@@ -132,9 +132,12 @@ def _quota() -> int:
         return MOST
 
 
-def split(rows: int, work: float) -> list[Range]:
-    """Ranges of rows for as many threads as `work`, numbers that are touched, is worth."""
-    count = int(min(work // GRAIN, rows))
+def split(rows: int, work: float, least: int = 1) -> list[Range]:
+    """Ranges of rows for as many threads as `work`, numbers that are touched, is worth.
+
+    least: rows of a range, where there are more ranges than one.
+    """
+    count = int(min(work // GRAIN, rows // least))
     count = min(threads(), count) if count > 1 else 1
     if count <= 1:
         return [(0, rows)]

@@ -7,16 +7,18 @@ matrix that several solves read at the same time and nobody writes to.
 from __future__ import annotations
 
 from dataclasses import dataclass, field, replace
+from functools import cached_property
 
 import numpy as np
 from numba import uint64
 from numpy.typing import NDArray
 
 from ..core.compiled import njit
-from ..core.threads import over_rows, over_stages
+from ..core.threads import Range, over_rows, over_stages
+from .chunks import chunks_among
 from .level_matrix import LevelMatrix
 from .node_blocks import NodeBlocks, row_product, row_product_back
-from .some_rows import relax, residual_rows, sweep_rows
+from .some_rows import relax, residual_in_rows, smooth_rows
 
 Array = NDArray[np.float64]
 Index = NDArray[np.int64]
@@ -42,6 +44,11 @@ class Rows:
         number[node] = np.arange(len(node))
         slots, ends = A.slots(node)
         return cls(node, number, slots, ends.astype(np.int32), A.indices[slots])
+
+    @cached_property
+    def chunks(self) -> list[Range]:
+        """Ranges of these rows, every second of which is swept at once."""
+        return chunks_among(self.node, self.indptr, self.indices)
 
 
 @dataclass(eq=False)
@@ -117,13 +124,12 @@ class PatchedOperator:
 
     def smooth(self, b: Array, x: Array, held: NDArray[np.bool_], backward: bool) -> None:
         """One sweep on A x = b over the nodes that are not held; backward: own rows first."""
-        own = self.rows
-        rows = own.node, own.indptr, own.indices, self.data, self.inverse, b, x, held, backward
+        own = self.rows, self.data, self.inverse, b, x, held, backward
         if backward:
-            sweep_rows(*rows)
+            smooth_rows(*own)
         self.base.smooth(b, x, self.own | held, backward)
         if not backward:
-            sweep_rows(*rows)
+            smooth_rows(*own)
 
     def first_smooth(self, b: Array, x: Array, r: Array) -> None:
         """The same forwards from x = 0, and r = b - A x."""
@@ -134,8 +140,7 @@ class PatchedOperator:
     def residual(self, x: Array, b: Array, out: Array) -> None:
         """out = b - A x."""
         self.base.residual(x, b, out)
-        own = self.rows
-        residual_rows(own.node, own.indptr, own.indices, self.data, x, b, out)
+        residual_in_rows(self.rows, self.data, x, b, out)
 
     def stored(self) -> NodeBlocks:
         """The whole matrix."""

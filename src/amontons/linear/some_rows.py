@@ -3,12 +3,16 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
+from typing import Protocol
 
 import numpy as np
 from numba import uint64
 from numpy.typing import NDArray
 
 from ..core.compiled import njit
+from ..core.threads import Range, over_rows, over_stages
+from .chunks import chunks_among
 from .level_matrix import LevelMatrix
 from .node_blocks import row_product, row_product_back
 
@@ -35,14 +39,57 @@ class SomeRows:
         rows = A.rows(node)
         return cls(node, rows.indptr, rows.indices, rows.data, rows.inverse)
 
+    @cached_property
+    def chunks(self) -> list[Range]:
+        """Ranges of these rows, every second of which is swept at once."""
+        return chunks_among(self.node, self.indptr, self.indices)
+
     def smooth(self, b: Array, x: Array, held: NDArray[np.bool_], backward: bool) -> None:
         """A block Gauss-Seidel sweep on A x = b over those of the nodes that are not held."""
-        sweep_rows(self.node, self.indptr, self.indices, self.data, self.inverse, b, x, held,
-                   backward)  # fmt: skip
+        smooth_rows(self, self.data, self.inverse, b, x, held, backward)
 
     def residual(self, x: Array, b: Array, out: Array) -> None:
         """out = b - A x in these rows."""
-        residual_rows(self.node, self.indptr, self.indices, self.data, x, b, out)
+        residual_in_rows(self, self.data, x, b, out)
+
+
+class Pattern(Protocol):
+    """Rows of nodes (k,), where their entries are, and the chunks that threads share."""
+
+    @property
+    def node(self) -> Index:
+        """Of the rows."""
+        ...
+
+    @property
+    def indptr(self) -> NDArray[np.int32]:
+        """Where the entries of each begin."""
+        ...
+
+    @property
+    def indices(self) -> NDArray[np.int32]:
+        """Their columns."""
+        ...
+
+    @property
+    def chunks(self) -> list[Range]:
+        """Ranges of rows, every second of which is swept at once."""
+        ...
+
+
+def smooth_rows(  # noqa: PLR0913
+    rows: Pattern, data: Array, inverse: Array, b: Array, x: Array,
+    held: NDArray[np.bool_], backward: bool,
+) -> None:  # fmt: skip
+    """A sweep on A x = b over the rows that are not held, their blocks being data (e, 3, 3)."""
+    over_stages(sweep_rows, rows.chunks, 10.0 * len(data), rows.node, rows.indptr, rows.indices,
+                data, inverse, b, x, held, backward, backward=backward)  # fmt: skip
+
+
+def residual_in_rows(rows: Pattern, data: Array, x: Array, b: Array, out: Array) -> None:
+    """out = b - A x in these rows."""
+    over_rows(residual_rows, len(rows.node), 10.0 * len(data), rows.node, rows.indptr,
+              rows.indices, data, x, b, out)  # fmt: skip
 
 
 @njit(cache=True, error_model="numpy", inline="always")
@@ -55,10 +102,10 @@ def relax(D, b, s, x, i):
 
 
 @njit(cache=True, error_model="numpy", nogil=True)
-def sweep_rows(node, indptr, indices, data, inverse, b, x, held, backward):  # noqa: PLR0913
-    """A block Gauss-Seidel sweep over the nodes of some rows that are not held."""
-    for step in range(len(node)):
-        k = len(node) - 1 - step if backward else step
+def sweep_rows(begin, end, node, indptr, indices, data, inverse, b, x, held, backward):  # noqa: PLR0913
+    """A block Gauss-Seidel sweep over the nodes of a chunk of rows that are not held."""
+    for step in range(end - begin):
+        k = end - 1 - step if backward else begin + step
         i = uint64(node[k])
         if not held[i]:
             first, last = uint64(indptr[k]), uint64(indptr[k + 1])
@@ -70,9 +117,9 @@ def sweep_rows(node, indptr, indices, data, inverse, b, x, held, backward):  # n
 
 
 @njit(cache=True, error_model="numpy", nogil=True)
-def residual_rows(node, indptr, indices, data, x, b, r):  # noqa: PLR0913
+def residual_rows(begin, end, node, indptr, indices, data, x, b, r):  # noqa: PLR0913
     """r = b - A x in some rows."""
-    for k in range(len(node)):
+    for k in range(begin, end):
         i = uint64(node[k])
         s = row_product(indices, data, x, uint64(indptr[k]), uint64(indptr[k + 1]))
         r[i, 0], r[i, 1], r[i, 2] = b[i, 0] - s[0], b[i, 1] - s[1], b[i, 2] - s[2]
