@@ -7,35 +7,30 @@ matrix that several solves read at the same time and nobody writes to.
 from __future__ import annotations
 
 from dataclasses import dataclass, field, replace
-from functools import cached_property
 
 import numpy as np
 from numba import uint64
 from numpy.typing import NDArray
 
 from ..core.compiled import njit
-from ..core.threads import Range, over_rows, over_stages
-from .chunks import chunks_among
+from ..core.threads import over_rows, over_stages
 from .level_matrix import LevelMatrix
 from .node_blocks import NodeBlocks, row_product, row_product_back
-from .some_rows import relax, residual_in_rows, smooth_rows
+from .some_rows import Pattern, relax
 
 Array = NDArray[np.float64]
 Index = NDArray[np.int64]
 
 
 @dataclass(frozen=True, eq=False)
-class Rows:
-    """Some rows of a matrix: node (k,) ascending, and slots (e,): their entries in its data.
+class Rows(Pattern):
+    """Some rows of a matrix, nodes ascending, and slots (e,): their entries in its data.
 
-    number (nodes,): place of a node among them, -1 for others; indptr (k + 1,), indices (e,).
+    number (nodes,): place of a node among them, -1 for others.
     """
 
-    node: Index
     number: NDArray[np.int32]
     slots: Index
-    indptr: NDArray[np.int32]
-    indices: NDArray[np.int32]
 
     @classmethod
     def of(cls, A: NodeBlocks, node: Index) -> Rows:
@@ -43,12 +38,7 @@ class Rows:
         number = np.full(A.nodes, -1, dtype=np.int32)
         number[node] = np.arange(len(node))
         slots, ends = A.slots(node)
-        return cls(node, number, slots, ends.astype(np.int32), A.indices[slots])
-
-    @cached_property
-    def chunks(self) -> list[Range]:
-        """Ranges of these rows, every second of which is swept at once."""
-        return chunks_among(self.node, self.indptr, self.indices)
+        return cls(node, ends.astype(np.int32), A.indices[slots], number, slots)
 
 
 @dataclass(eq=False)
@@ -124,12 +114,12 @@ class PatchedOperator:
 
     def smooth(self, b: Array, x: Array, held: NDArray[np.bool_], backward: bool) -> None:
         """One sweep on A x = b over the nodes that are not held; backward: own rows first."""
-        own = self.rows, self.data, self.inverse, b, x, held, backward
+        own = self.data, self.inverse, b, x, held, backward
         if backward:
-            smooth_rows(*own)
+            self.rows.sweep(*own)
         self.base.smooth(b, x, self.own | held, backward)
         if not backward:
-            smooth_rows(*own)
+            self.rows.sweep(*own)
 
     def first_smooth(self, b: Array, x: Array, r: Array) -> None:
         """The same forwards from x = 0, and r = b - A x."""
@@ -140,7 +130,7 @@ class PatchedOperator:
     def residual(self, x: Array, b: Array, out: Array) -> None:
         """out = b - A x."""
         self.base.residual(x, b, out)
-        residual_in_rows(self.rows, self.data, x, b, out)
+        self.rows.evaluate(self.data, x, b, out)
 
     def stored(self) -> NodeBlocks:
         """The whole matrix."""

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Protocol
 
 import numpy as np
 from numba import uint64
@@ -21,15 +20,43 @@ Index = NDArray[np.int64]
 
 
 @dataclass(frozen=True, eq=False)
-class SomeRows:
-    """Rows of nodes (k,) in ascending order: indptr (k + 1,), indices (e,), data (e, 3, 3).
-
-    inverse (k, 3, 3): of the diagonal blocks.
-    """
+class Pattern:
+    """Rows of nodes (k,), and where their entries are: indptr (k + 1,), indices (e,)."""
 
     node: Index
     indptr: NDArray[np.int32]
     indices: NDArray[np.int32]
+
+    @cached_property
+    def chunks(self) -> list[Range]:
+        """Ranges of these rows, every second of which is swept at once."""
+        return chunks_among(self.node, self.indptr, self.indices)
+
+    def sweep(  # noqa: PLR0913
+        self, data: Array, inverse: Array, b: Array, x: Array, held: NDArray[np.bool_],
+        backward: bool,
+    ) -> None:  # fmt: skip
+        """A block Gauss-Seidel sweep on A x = b over those of the nodes that are not held.
+
+        data (e, 3, 3): blocks of A; inverse (k, 3, 3): of the diagonal ones.
+        """
+        over_stages(sweep_rows, self.chunks, 10.0 * len(data), self.node, self.indptr,
+                    self.indices, data, inverse, b, x, held, backward,
+                    backward=backward)  # fmt: skip
+
+    def evaluate(self, data: Array, x: Array, b: Array, out: Array) -> None:
+        """out = b - A x in these rows."""
+        over_rows(residual_rows, len(self.node), 10.0 * len(data), self.node, self.indptr,
+                  self.indices, data, x, b, out)  # fmt: skip
+
+
+@dataclass(frozen=True, eq=False)
+class SomeRows(Pattern):
+    """Rows of nodes (k,) in ascending order with their blocks, data (e, 3, 3).
+
+    inverse (k, 3, 3): of the diagonal blocks.
+    """
+
     data: Array
     inverse: Array
 
@@ -39,57 +66,13 @@ class SomeRows:
         rows = A.rows(node)
         return cls(node, rows.indptr, rows.indices, rows.data, rows.inverse)
 
-    @cached_property
-    def chunks(self) -> list[Range]:
-        """Ranges of these rows, every second of which is swept at once."""
-        return chunks_among(self.node, self.indptr, self.indices)
-
     def smooth(self, b: Array, x: Array, held: NDArray[np.bool_], backward: bool) -> None:
         """A block Gauss-Seidel sweep on A x = b over those of the nodes that are not held."""
-        smooth_rows(self, self.data, self.inverse, b, x, held, backward)
+        self.sweep(self.data, self.inverse, b, x, held, backward)
 
     def residual(self, x: Array, b: Array, out: Array) -> None:
         """out = b - A x in these rows."""
-        residual_in_rows(self, self.data, x, b, out)
-
-
-class Pattern(Protocol):
-    """Rows of nodes (k,), where their entries are, and the chunks that threads share."""
-
-    @property
-    def node(self) -> Index:
-        """Of the rows."""
-        ...
-
-    @property
-    def indptr(self) -> NDArray[np.int32]:
-        """Where the entries of each begin."""
-        ...
-
-    @property
-    def indices(self) -> NDArray[np.int32]:
-        """Their columns."""
-        ...
-
-    @property
-    def chunks(self) -> list[Range]:
-        """Ranges of rows, every second of which is swept at once."""
-        ...
-
-
-def smooth_rows(  # noqa: PLR0913
-    rows: Pattern, data: Array, inverse: Array, b: Array, x: Array,
-    held: NDArray[np.bool_], backward: bool,
-) -> None:  # fmt: skip
-    """A sweep on A x = b over the rows that are not held, their blocks being data (e, 3, 3)."""
-    over_stages(sweep_rows, rows.chunks, 10.0 * len(data), rows.node, rows.indptr, rows.indices,
-                data, inverse, b, x, held, backward, backward=backward)  # fmt: skip
-
-
-def residual_in_rows(rows: Pattern, data: Array, x: Array, b: Array, out: Array) -> None:
-    """out = b - A x in these rows."""
-    over_rows(residual_rows, len(rows.node), 10.0 * len(data), rows.node, rows.indptr,
-              rows.indices, data, x, b, out)  # fmt: skip
+        self.evaluate(self.data, x, b, out)
 
 
 @njit(cache=True, error_model="numpy", inline="always")
