@@ -92,16 +92,10 @@ def pressed_beyond_its_rim(cells):
                     [am.Contact("die.bottom", master="slab.top", mu=0.3)])  # fmt: skip
 
 
-def test_a_slab_that_slips_off_a_corner_is_followed():
-    """Its equilibrium goes there: load steps alone take some hundred Newton steps.
-
-    Supports of the second step move onto the nodes below them while these are at rest, so that
-    facets are points: no state to warn of.
-    """
-    steps = list(am.evolve(pressed_beyond_its_rim((6, 3)), am.QuasiStatic(0.2), until=1.4))
-    counts = [step.solution.convergence.iterations for step in steps]
-    assert max(counts) <= 30
-    assert np.mean(counts) <= 6
+def test_supports_that_move_onto_nodes_at_rest_make_points_of_facets():
+    """In the second step, before any solution: no state to warn of."""
+    steps = list(am.evolve(pressed_beyond_its_rim((4, 2)), am.QuasiStatic(0.2), until=0.4))
+    assert max(step.solution.convergence.iterations for step in steps) <= 8
     forces = [step.reaction.reshape(-1, 2)[:147].sum(axis=0) for step in steps]
     assert (np.array(forces)[:, 1] > 0).all()
 
