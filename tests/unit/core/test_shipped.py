@@ -25,7 +25,7 @@ from amontons.core.telling import telling
 
 PACKAGE = Path(amontons.__file__).parent
 SIGNATURE = (types.float64, types.Array(types.float64, 1, "C"))
-KERNEL = "amontons.solvers.sweeps.kernels"
+KERNEL = "amontons.solvers.sweeps.mixing"
 CALL = f"""
 import sys
 import numpy as np
@@ -287,7 +287,7 @@ def test_a_package_that_is_only_read_needs_no_home(installed, tmp_path):
 def test_kernels_of_changed_sources_are_stale(installed, tmp_path):
     site = tmp_path / "site"
     shutil.copytree(installed, site, ignore=shutil.ignore_patterns("built"))
-    path = site / "amontons/solvers/sweeps/kernels.py"
+    path = site / "amontons/solvers/sweeps/mixing.py"
     text = path.read_text()
     begin = text.index("def _dot(")
     end = text.index("\n\n", begin)

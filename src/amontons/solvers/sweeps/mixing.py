@@ -29,6 +29,15 @@ def sums_of(history):
     return np.empty((blocks, history.shape[1] - 1 + WITH))
 
 
+@njit(cache=True, error_model="numpy", fastmath={"contract", "reassoc", "nsz"})
+def _dot(a, b):
+    """a . b; summed in any order, so that it is vectorised."""
+    total = 0.0
+    for i in range(len(a)):
+        total += a[i] * b[i]
+    return total
+
+
 @njit(cache=True, error_model="numpy", fastmath={"contract", "reassoc", "nsz"}, nogil=True)
 def record(begin, end, r, x, history, count, sums):  # noqa: PLR0913
     """Store the differences that the sweep from x to r, flat, makes; the sums of its blocks."""
@@ -50,10 +59,7 @@ def record(begin, end, r, x, history, count, sums):  # noqa: PLR0913
             image[i], residual[i] = g[i], f
         total[SIZE], total[OLD_SIZE], total[OWN] = size, old_size, own
         for a in range(used):
-            other, product = history[1, a, first:last], 0.0
-            for i in range(len(residual)):
-                product += other[i] * residual[i]
-            total[WITH + a] = product
+            total[WITH + a] = _dot(history[1, a, first:last], residual)
 
 
 @njit(cache=True, error_model="numpy")
