@@ -326,6 +326,29 @@ def test_a_weld_carries_the_weight_of_what_it_holds():
     np.testing.assert_allclose(end.position, [first.position, second.position], atol=1e-7)
 
 
+def test_bodies_that_overlap_as_given_are_named():
+    """Depth, place and both bodies; nothing where they only touch, or of later steps."""
+    balls = [RigidBody(Ball(0.1), position=(x, 0, z), name=name)
+             for x, z, name in ((0, 0.1, "left"), (0.17, 0.1, ""), (1, 0.1, ""), (2, 0.08, ""))]
+    _, steps = last(RigidBodies(balls, [FLOOR]), 1e-3, 3e-3)
+    (said,) = steps[0].warnings
+    assert said.name == "overlap-at-start"
+    words = "body 1 and body 0 'left' overlap at the start by 0.03 at (0.085, 0, 0.1), 2 pairs in"
+    assert words in said.message
+    assert not steps[1].warnings
+    assert not last(RigidBodies(balls[2:3], [FLOOR]), 1e-3, 1e-3)[0].warnings
+
+
+@pytest.mark.parametrize(("gap", "speeds"), [(0, (-0.5, 0.5, 0.5, 0.5)), (1e-3, (0, 0, 0, 1))])
+def test_a_cradle_passes_on_what_newtons_restitution_says(gap, speeds):
+    """u1 = -u0 at the contact that is hit and 0 at those that rest: momentum and energy stay."""
+    row = [RigidBody(Ball(0.1), position=((0.2 + gap) * k, 0, 0)) for k in range(3)]
+    first = RigidBody(Ball(0.1), position=(-0.205, 0, 0), velocity=(1, 0, 0))
+    system = RigidBodies([first, *row], mu=0.0, restitution=1.0, gravity=(0, 0, 0))
+    end, _ = last(system, 1e-3, 0.03, tolerance=1e-9)
+    np.testing.assert_allclose(end.state.motion.velocity[:, 0], speeds, atol=1e-6)
+
+
 def test_a_run_goes_on_from_a_state_with_the_same_numbers():
     bodies = [RigidBody(cuboid((0.2, 0.2, 0.2)), position=(0.02 * k, 0, 0.1 + 0.201 * k))
               for k in range(3)]  # fmt: skip

@@ -53,6 +53,7 @@ from scipy.sparse import csgraph
 from ...core.arrays import finite, number
 from ...core.clock import NEVER, Deadline
 from ...core.errors import Interrupted, InvalidInput, NotConverged, shown
+from ...core.warned import ResultWarning
 from ...problem.protocol import Problem
 from ...problem.solution import FrictionSolution
 from ...solvers.asked import Asked
@@ -64,7 +65,7 @@ from .meeting import Meetings, meetings
 from .quick import Found, Posed, law_of, matched, pose
 from .rolling import couples, rolling_problem
 from .rows import Rows, delassus, impulses, rotations, rows_at, turned, velocities
-from .states import Motion, RigidEnergies, RigidState, RigidStep
+from .states import Motion, RigidEnergies, RigidState, RigidStep, overlap_at_start
 from .sweeping import Search, found_quickly
 
 Array = NDArray[np.float64]
@@ -224,7 +225,15 @@ class _Stepping:
         )
         new = RigidState(state.index + 1, time, Motion(*motion), at.keys, r[:nc], moments)
         return RigidStep(self.system, new, at.found, at.rows.axes[:nc], r[:nc], r[nc:],
-                         RigidEnergies(*energies), solved)  # fmt: skip
+                         RigidEnergies(*energies), solved, self._said_of(state))  # fmt: skip
+
+    def _said_of(self, state: RigidState) -> tuple[ResultWarning, ...]:
+        """What the first step has to say about the state that it begins with."""
+        if state.index:
+            return ()
+        x, R = state.motion.position, rotations(state.motion.orientation)
+        found = meetings(self.system.packed, x, R, self.near)
+        return overlap_at_start(self.system, found, self.overlap)
 
     def _rows(self, x: Array, R: Array, apart: Array | float = 0.0) -> _Met:
         """Contacts and joints of bodies at x, turned by R; apart (n,): gaps that count."""
