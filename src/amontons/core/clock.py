@@ -171,7 +171,7 @@ class Deadline:
         return f"{self.seconds:g} s" if self.work is None else f"the work of {self.seconds:g} s"
 
 
-def told(seconds: float) -> str:
+def duration(seconds: float) -> str:
     """A duration in words, of two digits or whole seconds: never as a power of ten."""
     return f"{seconds:.2g} s" if seconds < 99.5 else f"{seconds:.0f} s"
 

@@ -54,8 +54,10 @@ def ends_of(case):
 
 
 @pytest.mark.parametrize(("card", "line", "words"), [
-    ("BOUNDARY", "NONE, 1, 3", "node set NONE: is empty"), ("CLOAD", "NONE, 1, 3.", "node set NONE"),
-    ("TEMPERATURE", "NONE, 10.", "node set NONE"), ("DLOAD", "NOBODY, P1, 1.", "NOBODY P1': holds no"),
+    ("BOUNDARY", "NONE, 1, 3", "node set NONE: is empty"),
+    ("CLOAD", "NONE, 1, 3.", "node set NONE: is empty"),
+    ("TEMPERATURE", "NONE, 10.", "node set NONE: is empty"),
+    ("DLOAD", "NOBODY, P1, 1.", "NOBODY P1': holds no"),
     ("DLOAD", "NOBODY, GRAV, 9.81, 0, 0, -1", "element set NOBODY: is empty"),
     ("DSLOAD", "NOFACE, P, 1.", "NOFACE': holds no"),
 ])  # fmt: skip

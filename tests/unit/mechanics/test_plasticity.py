@@ -69,7 +69,7 @@ def test_loads_that_go_leave_what_has_flown():
 
 
 def test_shear_to_and_fro_through_the_first_place():
-    """Closed form of each stretch.  Back at t = 2, nothing moves supports but what has flown."""
+    """Closed form of each stretch.  Back at t = 2, supports are where they began."""
     shear, slope, limit, most = 200 / 2.6, 20.0, 1 / np.sqrt(3), 0.04
     steel = am.ElastoPlastic(200.0, 0.3, yield_stress=1.0, hardening=slope)
 

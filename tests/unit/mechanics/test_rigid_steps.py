@@ -333,7 +333,7 @@ def test_bodies_that_overlap_as_given_are_named():
     _, steps = last(RigidBodies(balls, [FLOOR]), 1e-3, 3e-3)
     (said,) = steps[0].warnings
     assert said.name == "overlap-at-start"
-    words = "body 1 and body 0 'left' overlap at the start by 0.03 at (0.085, 0, 0.1), 2 pairs in"
+    words = "body 1 and body 0 'left' overlap at the start by 0.03 at (0.085, 0, 0.1), 2 pairs"
     assert words in said.message
     assert not steps[1].warnings
     assert not last(RigidBodies(balls[2:3], [FLOOR]), 1e-3, 1e-3)[0].warnings
@@ -341,7 +341,7 @@ def test_bodies_that_overlap_as_given_are_named():
 
 @pytest.mark.parametrize(("gap", "speeds"), [(0, (-0.5, 0.5, 0.5, 0.5)), (1e-3, (0, 0, 0, 1))])
 def test_a_cradle_passes_on_what_newtons_restitution_says(gap, speeds):
-    """u1 = -u0 at the contact that is hit and 0 at those that rest: momentum and energy stay."""
+    """u1 = -u0 at the contact that is hit, 0 at those that rest: momentum and energy stay."""
     row = [RigidBody(Ball(0.1), position=((0.2 + gap) * k, 0, 0)) for k in range(3)]
     first = RigidBody(Ball(0.1), position=(-0.205, 0, 0), velocity=(1, 0, 0))
     system = RigidBodies([first, *row], mu=0.0, restitution=1.0, gravity=(0, 0, 0))

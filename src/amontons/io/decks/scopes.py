@@ -91,8 +91,8 @@ class Scope:
         """
         found = self._named(text, row, what)
         if not len(found):
-            raise row.error(f"{what} set {text}: is empty, so that this line does nothing: give "
-                            f"the set its {what}s, or take the line out")  # fmt: skip
+            text = f"{what} set {text}: is empty, so that this line does nothing"
+            raise row.error(f"{text}: give it {what}s, or take the line out")
         return found
 
     def _named(self, text: str, row: Row, what: str) -> Index:

@@ -7,17 +7,17 @@ own axes, to the end of a step h:
     m (v1 - v0) = h m g + P,    J (W_r - W_f) = R_m^T T            P, T of the impulses r
     x1 = x0 + h (v0 + v1) / 2,  Q1 = Q0 exp(h (W0 + W1) / 2)
 
-with W_f after half a step h / 2 without contact (`rows.turned_freely`) from W0, and W1 after the
-other half from W_r.  (With a whole free step before the impulses a spinning top, whose moment
-and spin are about different axes, would lose energy and moment of momentum of first order in h.)
-Contacts whose gap at the midpoint is not positive take part, with the law between r and u1 + e
-u0_N, where u0 is of v0 and W_f and u1 of v1 and W_r ([M]; with min(u0_N, 0) a contact that parts
-and is pressed by another impact would gain energy).  What an
-impact leaves of overlap, h |u_N| / 2 at most, and joints lose by turning, is mended where it is
-more than `overlap`: by the smallest displacements, in the metric of the masses, that take it
-away.  What was mended takes part, though rotations open it by their squares.  (A law that lets
-open contacts close without overlap, u1_N >= -gap / h, turns a rocking block round a step too
-early at each impact; at the same step its times are wrong by six times as much.)
+with W_f after half a step h / 2 without contact from W0 (`rows.turned_freely`), and W1 after
+the other half from W_r.  (With a whole free step before the impulses a spinning top, whose
+moment and spin are about different axes, would lose energy and moment of momentum of first
+order in h.)  Contacts whose gap at the midpoint is not positive take part, with the law between
+r and u1 + e u0_N, where u0 is of v0 and W_f and u1 of v1 and W_r ([M]; with min(u0_N, 0) a
+contact that parts and is pressed by another impact would gain energy).  What an impact leaves
+of overlap, h |u_N| / 2 at most, and joints lose by turning, is mended where it is more than
+`overlap`: by the smallest displacements, in the metric of the masses, that take it away.  What
+was mended takes part, though rotations open it by their squares.  (A law that lets open
+contacts close without overlap, u1_N >= -gap / h, turns a rocking block round a step too early
+at each impact; at the same step its times are wrong by six times as much.)
 
 Joints take back beyond the middle what they turned away from before it: with u_m of the
 velocities before the step and arms at its middle, u_b with those at its beginning,

@@ -139,9 +139,11 @@ def overlap_at_start(
     pairs = len({*zip(found.slave[deep].tolist(), found.master[deep].tolist(), strict=True)})
     more = f", {pairs} pairs in all" if pairs > 1 else ""
     place = ", ".join(f"{x:.4g}" for x in found.points[worst])
-    text = (f"{_named(system, slave)} and {other} overlap at the start by {-found.gaps[worst]:.3g} "
-            f"at ({place}){more}: they are moved apart within the first step, so that bodies do "
-            "not begin where they were put; give positions without overlap")  # fmt: skip
+    text = (
+        f"{_named(system, slave)} and {other} overlap at the start by "
+        f"{-found.gaps[worst]:.3g} at ({place}){more}: they are moved apart within the first "
+        "step, so that bodies do not begin where they were put; give positions without overlap"
+    )
     return (ResultWarning("overlap-at-start", text),)
 
 
