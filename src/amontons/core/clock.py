@@ -171,6 +171,11 @@ class Deadline:
         return f"{self.seconds:g} s" if self.work is None else f"the work of {self.seconds:g} s"
 
 
+def duration(seconds: float) -> str:
+    """A duration in words, of two digits or whole seconds: never as a power of ten."""
+    return f"{seconds:.2g} s" if seconds < 99.5 else f"{seconds:.0f} s"
+
+
 NEVER = Deadline()
 TimeLimit = float | Deadline | None  # seconds of the clock on the wall, as in all `time_limit`
 

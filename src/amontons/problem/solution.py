@@ -11,6 +11,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from ..core.clock import duration
 from ..core.errors import SingularOperator
 from ..core.faces import Differentiated, Shown
 from ..core.locks import KeepsLocks
@@ -170,7 +171,7 @@ class Convergence(Shown):
             f"after {self.iterations} iterations in {self.seconds:.3g} s"
         )
         if self.compiling >= TELLING:
-            text += f", after {self.compiling:.2g} s of compiling"
+            text += f", after {duration(self.compiling)} of compiling"
         return f"{text} ({self.detail})" if self.detail else text
 
 

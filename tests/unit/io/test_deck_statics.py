@@ -53,6 +53,24 @@ def ends_of(case):
     return {round(step.time, 6): step.displacement[0] for step in found}
 
 
+@pytest.mark.parametrize(("card", "line", "words"), [
+    ("BOUNDARY", "NONE, 1, 3", "node set NONE: is empty"),
+    ("CLOAD", "NONE, 1, 3.", "node set NONE: is empty"),
+    ("TEMPERATURE", "NONE, 10.", "node set NONE: is empty"),
+    ("DLOAD", "NOBODY, P1, 1.", "NOBODY P1': holds no"),
+    ("DLOAD", "NOBODY, GRAV, 9.81, 0, 0, -1", "element set NOBODY: is empty"),
+    ("DSLOAD", "NOFACE, P, 1.", "NOFACE': holds no"),
+])  # fmt: skip
+def test_supports_and_loads_of_empty_sets_are_refused(tmp_path, card, line, words):
+    """They did nothing, without a word: a body could be held less than its deck says."""
+    deck = BRICK.replace(
+        "*BOUNDARY\n1", "*NSET, NSET=NONE\n*ELSET, ELSET=NOBODY\n*SURFACE, NAME=NOFACE\n"
+        "*BOUNDARY\n1",
+    )  # fmt: skip
+    with pytest.raises(am.FileFormatError, match=words):
+        case_of(tmp_path, deck.replace("*CLOAD", f"*{card}\n{line}\n*CLOAD"))
+
+
 def test_a_pulled_brick(tmp_path):
     case = case_of(tmp_path, BRICK)
     assert any("no contact in this deck" in note for note in case.notes)

@@ -68,6 +68,25 @@ def test_loads_that_go_leave_what_has_flown():
     assert lost == pytest.approx(work, rel=0.05)  # two steps, each with the stress of its end
 
 
+def test_shear_to_and_fro_through_the_first_place():
+    """Closed form of each stretch.  Back at t = 2, supports are where they began."""
+    shear, slope, limit, most = 200 / 2.6, 20.0, 1 / np.sqrt(3), 0.04
+    steel = am.ElastoPlastic(200.0, 0.3, yield_stress=1.0, hardening=slope)
+
+    def way(t):
+        return most * (t if t <= 1 else 2 - t)
+
+    sides = ("bottom", "top", "left", "right", "front", "back")
+    supports = [am.Fix(side, lambda x, t: (way(t) * x[2], 0, 0)) for side in sides]
+    model = am.Model([am.Body(am.box((1, 1, 1), cells=(2, 2, 2)), steel)], supports)
+    stress, at = 0.0, 0.0
+    for step in am.evolve(model, am.QuasiStatic(0.5), until=2.5):
+        stress, at = stress + shear * (way(step.time) - at), way(step.time)
+        flow = max(0.0, (abs(stress) - limit) / (shear + slope / 3))
+        stress, limit = stress - np.sign(stress) * shear * flow, limit + slope / 3 * flow
+        assert step.supports["top"].force[0] == pytest.approx(stress, rel=1e-9)
+
+
 def test_small_strains_are_those_of_linear_elasticity():
     """solve and evolve, below the yield stress."""
     one, other = (am.solve(am.Model(*_block(law, integration="full")))

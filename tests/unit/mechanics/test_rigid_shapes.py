@@ -13,6 +13,8 @@ from scipy.optimize import linprog
 from scipy.spatial.transform import Rotation
 
 import amontons as am
+from amontons.io.plots.rigid_film import rigid_figures
+from amontons.io.plots.style import Units
 from amontons.mechanics.multibody import Ball, Polyhedron, RigidBodies, RigidBody, cuboid
 from amontons.mechanics.multibody.apart import edges_apart
 from amontons.mechanics.multibody.meeting import meetings
@@ -292,3 +294,7 @@ def test_a_film_shows_bodies_where_they_are(tmp_path):
     assert all(np.abs(a - b).max() > 30 for a, b in itertools.pairwise(pictures))
     with pytest.raises(am.InvalidInput, match="steps"):
         am.film([*steps, 1], path)
+    figure = next(rigid_figures(steps[-1:], Units()))
+    marked = [len(line.get_xdata()) for line in figure.axes[0].get_lines()]
+    assert marked == [int((steps[-1].status == status).sum()) for status in am.ContactStatus]
+    assert sum(marked) == len(steps[-1].r) > 0

@@ -18,7 +18,7 @@ import click
 import numpy as np
 
 from ...analysis.profiles import performance_profile
-from ...core.clock import compiling, now
+from ...core.clock import compiling, duration, now
 from ...core.errors import InvalidInput, SingularOperator, UnsupportedForm
 from ...io import results as output
 from ...problem.friction import Form, FrictionProblem
@@ -197,7 +197,7 @@ def _show(timings: list[Timing], names: list[str], goals: list[float], by: str) 
     ]
     click.echo(f"solved of {len(timings) // len(names)}: {', '.join(solved)}")
     if compiled >= TELLING:
-        click.echo(f"compiling, once and not counted: {compiled:.2g} s")
+        click.echo(f"compiling, once and not counted: {duration(compiled)}")
 
 
 def _rows(
@@ -262,7 +262,7 @@ def _page(
             for row in _rows(timings, names, goals, by)]  # fmt: skip
     profiles, shown = _profiles(timings, names, goals, by)
     facts = [["criterion", stop.criterion.value], ["time limit", f"{stop.seconds:g} s"],
-             ["compiling, not counted", f"{sum(t.compiling for t in timings):.2g} s"]]
+             ["compiling, not counted", duration(sum(t.compiling for t in timings))]]
     what = "time" if by == "time" else "operations"
     return bench_page("Methods compared", ("problem", "tolerance", *names), rows, profiles,
                       shown, facts, what)  # fmt: skip

@@ -39,7 +39,7 @@ class Heat:
             for row in each.card.rows():
                 if len(row.fields) < 2:
                     raise row.error("*INITIAL CONDITIONS: expected nodes and a temperature")
-                nodes = each.scope.nodes(row.fields[0], row)
+                nodes = each.scope.acted_on(row.fields[0], row)
                 heat.first[nodes] = number(row.fields[1], row, "*INITIAL CONDITIONS")
         return heat
 
@@ -58,7 +58,7 @@ class Heat:
         for row in card.rows():
             if len(row.fields) < 2:
                 raise row.error("*TEMPERATURE: expected nodes and a temperature")
-            nodes = each.scope.nodes(row.fields[0], row)
+            nodes = each.scope.acted_on(row.fields[0], row)
             value = number(row.fields[1], row, "*TEMPERATURE")
             keys = np.stack([self.at[nodes].astype(float), self.first[nodes]], axis=1)
             for old, first in np.unique(keys, axis=0):

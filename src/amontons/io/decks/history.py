@@ -260,7 +260,7 @@ def _boundary(
         if option in card.options and card.label(option) != "DISPLACEMENT":
             raise card.error(f"{option}: is not read, expected prescribed displacements")
     for row in card.rows():
-        nodes = each.scope.nodes(row.fields[0], row)
+        nodes = each.scope.acted_on(row.fields[0], row)
         for component, value in _held(row):
             old = out.at[nodes, component]
             if out.before is not None:
@@ -305,7 +305,7 @@ def _forces(history: History, each: Placed, span: Span, known: Amplitudes,
         if option in card.options:
             raise card.error(f"{option}: is not read")
     for row in card.rows():
-        nodes = each.scope.nodes(row.fields[0], row)
+        nodes = each.scope.acted_on(row.fields[0], row)
         if len(row.fields) < 3:
             raise row.error("*CLOAD: expected nodes, component, value")
         component = whole(row.fields[1], row, "*CLOAD: component") - 1
@@ -344,6 +344,7 @@ def _distributed(history: History, each: Placed, span: Span, known: Amplitudes) 
         name, label = row.fields[0].upper(), row.fields[1].upper()
         value = number(row.fields[2], row, str(card))
         if label in ("GRAV", "CENTRIF"):
+            each.scope.acted_on(name, row, "element")
             way = way_of(row, label)
             one = (name, np.concatenate(way).tobytes())
             old = history.bodies.get(one)

@@ -84,6 +84,17 @@ class Scope:
         """The elements that a number or the name of a set stands for."""
         return self._named(text, row, "element")
 
+    def acted_on(self, text: str, row: Row, what: str = "node") -> Index:
+        """The same, of "node" or "element", by a card that does nothing to an empty set.
+
+        Raises FileFormatError for one: the support or load that is meant would be missing.
+        """
+        found = self._named(text, row, what)
+        if not len(found):
+            text = f"{what} set {text}: is empty, so that this line does nothing"
+            raise row.error(f"{text}: give it {what}s, or take the line out")
+        return found
+
     def _named(self, text: str, row: Row, what: str) -> Index:
         names, rest = self._place(text)
         known = names.node_sets if what == "node" else names.element_sets

@@ -13,6 +13,7 @@ from matplotlib.patches import Patch
 from matplotlib.ticker import MaxNLocator
 from numpy.typing import NDArray
 
+from ...core.clock import duration
 from ...problem.solution import TELLING, ContactStatus, Convergence, Step
 from ...solvers import METHODS
 from .layout import SMALL, Sheet, decades
@@ -44,9 +45,9 @@ def convergence_figure(record: Convergence, title: str = "") -> Figure:
     setup = float(seconds.min(initial=np.inf)) if len(seconds) else 0.0
     iterations = np.array([step.iteration for step in history], dtype=float)
     low, high = _limits(record)
-    before = f"set-up before: {setup:.2g} s"
+    before = f"set-up before: {duration(setup)}"
     if record.compiling >= TELLING:
-        before += f"; {record.compiling:.2g} s of compiling not counted"
+        before += f"; {duration(record.compiling)} of compiling not counted"
     time = f"seconds after the first iterate\n({before})"
     for axes, x, label in ((left, iterations, "iterations"), (right, seconds - setup, time)):
         last = x.max(initial=0.0) or 1.0  # a solve that ends where it starts

@@ -17,8 +17,7 @@ from .bodies import MARGIN, STONE
 from .camera import Camera
 from .layout import Sheet
 from .render import Window, render
-from .steps import joint_legend
-from .style import Units
+from .style import Units, status_marks
 
 Array = NDArray[np.float64]
 Index = NDArray[np.int64]
@@ -53,10 +52,12 @@ def rigid_figures(steps: Sequence[RigidStep], units: Units) -> Iterator[Figure]:
     for step, points in zip(steps, places, strict=True):
         image = render(camera, np.concatenate([points, *ground]), [triangles, quads], colour,
                        None, window)  # fmt: skip
-        yield _figure(step, image.colours, units)
+        met = window.pixels(camera.project(step.meetings.points))
+        yield _figure(step, image.colours, met, units)
 
 
-def _figure(step: RigidStep, pixels: NDArray[np.uint8], units: Units) -> Figure:
+def _figure(step: RigidStep, pixels: NDArray[np.uint8], met: Array, units: Units) -> Figure:
+    """The bodies, and their contacts (nc, 2) in pixels, those behind bodies too."""
     record = step.solution
     stamp = "" if record is None else record.convergence.stamp
     title = f"t = {step.time:.4g} {units.time}".rstrip()
@@ -64,8 +65,13 @@ def _figure(step: RigidStep, pixels: NDArray[np.uint8], units: Units) -> Figure:
     axes = sheet.panel(0.4, 0.05, *SIZE)
     axes.imshow(pixels, origin="lower", interpolation="none")
     axes.set_axis_off()
-    counts = {s: f"{s.name.lower()}: {int((step.status == s).sum())}" for s in ContactStatus}
-    joint_legend(sheet, counts)
+    labels = {s: f"{s.name.lower()}: {int((step.status == s).sum())}" for s in ContactStatus}
+    marks = status_marks(labels)
+    for mark, status in zip(marks, ContactStatus, strict=True):
+        axes.plot(*met[step.status == status].T, linestyle="", marker=mark.get_marker(),
+                  color=mark.get_color(), markeredgecolor=mark.get_markeredgecolor(),
+                  markersize=4, clip_on=False)  # fmt: skip
+    sheet.legend(marks, len(marks))
     return sheet.done()
 
 

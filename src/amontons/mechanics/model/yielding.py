@@ -13,6 +13,7 @@ history is never changed: the same step, asked for again, is the same to the las
 from __future__ import annotations
 
 from dataclasses import dataclass, field, replace
+from functools import cached_property
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -194,11 +195,27 @@ class YieldingProblem(TangentProblem):
         return replace(sizes, M=M, f=f, guess=None, _shared=Prepared())
 
     def _load_size(self, q: Array, found: Flown, elastic: float) -> float:
-        """Size of loads and of forces at supports; at most that of elastic bodies."""
+        """Size of loads and of forces at supports; at most that of elastic bodies, or before.
+
+        Elastic ones have none where a body that has flown is back at its first place, and what
+        it carries there is still of the size that it was.
+        """
+        size = self._carried(q, found, self.load)
+        return min(size, max(elastic, self._known_size)) or elastic
+
+    def _carried(self, q: Array, found: Flown, load: Array) -> float:
         parts = self.parts
         held = (parts.K @ q - found.forces)[parts.fixed]
-        size = np.hypot(np.linalg.norm(held), np.linalg.norm(parts.gathered(self.load)))
-        return min(float(size), elastic) or elastic
+        return float(np.hypot(np.linalg.norm(held), np.linalg.norm(parts.gathered(load))))
+
+    @cached_property
+    def _known_size(self) -> float:
+        """Size of loads and of forces at supports at share 0 of the load."""
+        if self.known is None:
+            return 0.0
+        load, prescribed, v = self.known
+        q = self.parts.spread(v, prescribed)
+        return self._carried(q, self.yielding.respond(q, self.history, tangent=False), load)
 
     # ---------------------------------------------------------------- what the driver asks
     def error(self, r: Array, v: Array | None = None) -> float:

@@ -17,8 +17,11 @@ def middle_of(position, orientation, velocity, spin, h):
 
 @njit(cache=True, error_model="numpy")
 def freely(velocity, spin, inertia, gravity, h):
-    """Velocities after a step h without reactions, angular ones in own axes; all (n, 3)."""
-    return velocity + h * gravity, turned_freely(inertia, spin, h)
+    """Velocities after a step h without reactions, angular ones in own axes after half of it.
+
+    All (n, 3).  The other half follows after the impulses, in `ended`: they act in the middle.
+    """
+    return velocity + h * gravity, turned_freely(inertia, spin, 0.5 * h)
 
 
 @njit(cache=True, error_model="numpy")
@@ -62,6 +65,7 @@ def ended(rows, r, couples, R, bodies, gravity, h, begin, motion, free):  # noqa
         old = 0.5 * (masses[b] * before + _twice_turning(inertia[b], spin[b]))
         kinetic += new
         gain += new - old
+    turning = turned_freely(inertia, turning, 0.5 * h)  # keeps the energy
     angle = 0.5 * h * (spin + turning)
     energies = kinetic, potential, gain, contact, mending
     return (x, turned(orientation, angle), after, turning), energies

@@ -4,17 +4,20 @@ Moreau's midpoint rule with finite rotations.  From x0, Q0, v0 and W0, the angul
 own axes, to the end of a step h:
 
     x_m = x0 + h v0 / 2,  Q_m = Q0 exp(h W0 / 2)                   where contacts are looked for
-    m (v1 - v0) = h m g + P,    J (W1 - W_f) = R_m^T T             P, T of the impulses r
+    m (v1 - v0) = h m g + P,    J (W_r - W_f) = R_m^T T            P, T of the impulses r
     x1 = x0 + h (v0 + v1) / 2,  Q1 = Q0 exp(h (W0 + W1) / 2)
 
-with W_f after a step without contact (`rows.turned_freely`).  Contacts whose gap at the
-midpoint is not positive take part, with the law between r and u1 + e u0_N ([M]; with min(u0_N,
-0) a contact that parts and is pressed by another impact would gain energy).  What an
-impact leaves of overlap, h |u_N| / 2 at most, and joints lose by turning, is mended where it is
-more than `overlap`: by the smallest displacements, in the metric of the masses, that take it
-away.  What was mended takes part, though rotations open it by their squares.  (A law that lets
-open contacts close without overlap, u1_N >= -gap / h, turns a rocking block round a step too
-early at each impact; at the same step its times are wrong by six times as much.)
+with W_f after half a step h / 2 without contact from W0 (`rows.turned_freely`), and W1 after
+the other half from W_r.  (With a whole free step before the impulses a spinning top, whose
+moment and spin are about different axes, would lose energy and moment of momentum of first
+order in h.)  Contacts whose gap at the midpoint is not positive take part, with the law between
+r and u1 + e u0_N, where u0 is of v0 and W_f and u1 of v1 and W_r ([M]; with min(u0_N, 0) a
+contact that parts and is pressed by another impact would gain energy).  What an impact leaves
+of overlap, h |u_N| / 2 at most, and joints lose by turning, is mended where it is more than
+`overlap`: by the smallest displacements, in the metric of the masses, that take it away.  What
+was mended takes part, though rotations open it by their squares.  (A law that lets open
+contacts close without overlap, u1_N >= -gap / h, turns a rocking block round a step too early
+at each impact; at the same step its times are wrong by six times as much.)
 
 Joints take back beyond the middle what they turned away from before it: with u_m of the
 velocities before the step and arms at its middle, u_b with those at its beginning,
@@ -29,8 +32,8 @@ motion of the bodies, and rows that say things twice do not contradict each othe
 
 Gravity that changes in time is that of the middle of a step.
 
-Energies: kinetic + potential gain what contacts do, r . (u0 + u1) / 2 (of W_f for rotations),
-and what the mending of overlaps does.  That is an identity of the scheme, to rounding.
+Energies: kinetic + potential gain what contacts do, r . (u0 + u1) / 2, and what the mending of
+overlaps does.  That is an identity of the scheme, to rounding.
 
 [M] J. J. Moreau, "Unilateral contact and dry friction in finite freedom dynamics", CISM 302
 (1988).  [J] M. Jean, "The non smooth contact dynamics method", CMAME 177 (1999).
@@ -50,6 +53,7 @@ from scipy.sparse import csgraph
 from ...core.arrays import finite, number
 from ...core.clock import NEVER, Deadline
 from ...core.errors import Interrupted, InvalidInput, NotConverged, shown
+from ...core.warned import ResultWarning
 from ...problem.protocol import Problem
 from ...problem.solution import FrictionSolution
 from ...solvers.asked import Asked
@@ -61,7 +65,7 @@ from .meeting import Meetings, meetings
 from .quick import Found, Posed, law_of, matched, pose
 from .rolling import couples, rolling_problem
 from .rows import Rows, delassus, impulses, rotations, rows_at, turned, velocities
-from .states import Motion, RigidEnergies, RigidState, RigidStep
+from .states import Motion, RigidEnergies, RigidState, RigidStep, overlap_at_start
 from .sweeping import Search, found_quickly
 
 Array = NDArray[np.float64]
@@ -203,7 +207,7 @@ class _Stepping:
         solved, r, moments, turn = None, np.zeros((0, 3)), NOTHING, self.no_couples
         if len(at.rows.slave):
             posed = Posed(*pose(
-                at.rows, nc, (masses, self.inverse, R), (before.velocity, before.spin), free,
+                at.rows, nc, (masses, self.inverse, R), (before.velocity, free[1]), free,
                 self.system.restitution, at.keys, (state.keys, state.impulses),
             ))  # fmt: skip
             if len(at.apart):
@@ -221,7 +225,15 @@ class _Stepping:
         )
         new = RigidState(state.index + 1, time, Motion(*motion), at.keys, r[:nc], moments)
         return RigidStep(self.system, new, at.found, at.rows.axes[:nc], r[:nc], r[nc:],
-                         RigidEnergies(*energies), solved)  # fmt: skip
+                         RigidEnergies(*energies), solved, self._said_of(state))  # fmt: skip
+
+    def _said_of(self, state: RigidState) -> tuple[ResultWarning, ...]:
+        """What the first step has to say about the state that it begins with."""
+        if state.index:
+            return ()
+        x, R = state.motion.position, rotations(state.motion.orientation)
+        found = meetings(self.system.packed, x, R, self.near)
+        return overlap_at_start(self.system, found, self.overlap)
 
     def _rows(self, x: Array, R: Array, apart: Array | float = 0.0) -> _Met:
         """Contacts and joints of bodies at x, turned by R; apart (n,): gaps that count."""

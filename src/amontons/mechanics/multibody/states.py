@@ -9,6 +9,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from ...core.warned import ResultWarning
 from ...problem.rolling import Regimes, RollingProblem
 from ...problem.solution import FrictionSolution
 from .bodies import RigidBodies
@@ -67,7 +68,8 @@ class RigidStep:
     meetings: contacts that were looked at, the first of `solution`; r (nc, 3): their impulses
     in their frames, normal first; frames (nc, 3, 3) by rows; joints (k, 3): impulses on the
     first bodies, in global axes; moments (nc, 3): angular impulses where friction resists
-    rolling or spinning, about the normal first, else none.
+    rolling or spinning, about the normal first, else none.  warnings: of the first step, where
+    bodies overlapped as they were given (`overlap_at_start`), else none.
     """
 
     system: RigidBodies
@@ -78,6 +80,7 @@ class RigidStep:
     joints: Array
     energies: RigidEnergies
     _solved: FrictionSolution | Found | None = field(repr=False)
+    warnings: tuple[ResultWarning, ...] = ()
 
     @property
     def time(self) -> float:
@@ -118,3 +121,32 @@ class RigidStep:
         if self._solved is None:
             return np.zeros(0, np.int8)
         return self._solved.status[: len(self.r)]
+
+
+def overlap_at_start(
+    system: RigidBodies, found: Meetings, allowed: float
+) -> tuple[ResultWarning, ...]:
+    """A warning where bodies as they are given overlap by more than allowed, unit of length.
+
+    found: their meetings.  Such bodies are moved apart within the first step.
+    """
+    deep = found.gaps < -allowed
+    if not deep.any():
+        return ()
+    worst = int(np.argmin(found.gaps))
+    slave, master = int(found.slave[worst]), int(found.master[worst])
+    other = "a plane" if master < 0 else _named(system, master)
+    pairs = len({*zip(found.slave[deep].tolist(), found.master[deep].tolist(), strict=True)})
+    more = f", {pairs} pairs in all" if pairs > 1 else ""
+    place = ", ".join(f"{x:.4g}" for x in found.points[worst])
+    text = (
+        f"{_named(system, slave)} and {other} overlap at the start by "
+        f"{-found.gaps[worst]:.3g} at ({place}){more}: they are moved apart within the first "
+        "step, so that bodies do not begin where they were put; give positions without overlap"
+    )
+    return (ResultWarning("overlap-at-start", text),)
+
+
+def _named(system: RigidBodies, number: int) -> str:
+    name = system.bodies[number].name
+    return f"body {number} '{name}'" if name else f"body {number}"
