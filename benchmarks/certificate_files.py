@@ -2,11 +2,12 @@
 
     python benchmarks/certificate_files.py [--certificates 1000] [--forgeries 10000]
 
-Random problems of two to six contacts in 2D and 3D: every load and one load; in 2D all
-solutions where there are several, and all branches between two loads; in 3D of up to three
-contacts all solutions of a load, and over load and friction.  Each forgery
-changes one byte of one of the files at random; one counts as accepted where the checker still
-agrees while W, q, mu, r0, the claim or anything else that the hash covers is another.
+Random problems of two to six contacts in 2D and 3D, in turn: every load and one load; all
+solutions of a load and all branches between two loads, in 3D of up to three contacts and also
+where friction changes.  Where lists and branches are asked for, W couples normals with
+tangents, so that several solutions are likely.  Each forgery changes one byte of one of the
+files at random; one counts as accepted where the checker still agrees while W, q, mu, r0, the
+claim or anything else that the hash covers is another.
 """
 
 from __future__ import annotations
@@ -25,42 +26,54 @@ import numpy as np
 from machine import describe
 
 import amontons as am
-from amontons.analysis.certificates.verdict import Verdict
+from amontons.core.clock import deadline_of
 from amontons.io import certificate_checker as checker
 
 REFUSED, HARMLESS, WRONG, CRASHED = "refused", "harmless", "wrong", "crashed"
 RESULTS = Path(__file__).parent / "results"
-CURVED, CURVES = 3, (0, 4, 8)  # contacts in 3D, and seeds: a list, then all branches
+CURVED = 3  # contacts in 3D of which lists and branches are asked, at most
+LISTS, LOADS, FRICTION = (0, 1), (2, 5), (9,)  # seeds modulo 16 of these kinds
+LIMIT = 20  # seconds of a search, counted in operations: the same on every machine
 
 
 def problem_of(seed: int) -> am.FrictionProblem:
     """2D and 3D in turn; little friction for every load, more for this load or several."""
     random = np.random.default_rng(seed)
     d, nc = 2 + seed % 2, int(random.integers(2, 7))
+    listed = seed % 16 in LISTS + LOADS + FRICTION
+    if d == 3 and listed:
+        nc = int(random.integers(1, CURVED + 1))
     A = random.standard_normal((nc * d, nc * d))
     W = A @ A.T / (nc * d) + 0.1 * np.eye(nc * d)
+    if listed:
+        own = np.eye(d)
+        own[0, 1] = own[1, 0] = random.uniform(0.7, 0.95)
+        W = np.kron(np.eye(nc), own) + 0.05 * A @ A.T / (nc * d)
     W *= 10.0 ** random.uniform(-6, 6)
-    q = random.standard_normal((nc, d)) - np.eye(d)[0]
-    most = {0: 4.0 if seed % 8 == 0 else 1.5, 3: 0.4}.get(seed % 4, 0.08)
-    mu = random.uniform(0, most, nc)
+    q = random.standard_normal((nc, d)) - np.eye(d)[0] * (not listed)
+    most = {0: 1.5, 3: 0.4}.get(seed % 4, 0.08)
+    mu = random.uniform(1.0, 3.0, nc) if listed else random.uniform(0, most, nc)
     return am.FrictionProblem.from_delassus(W, q, mu)
 
 
 def write(problem: am.FrictionProblem, seed: int, path: Path) -> str:
-    """The claim of a certificate of a problem."""
-    if problem.dimension == 2 and seed % 16 == 1:
-        q = np.random.default_rng(seed).standard_normal((problem.contacts, 2))
-        end = am.FrictionProblem.from_delassus(problem.W, q, problem.mu)
-        return am.write_certificate(problem, am.diagram(end, base=problem), path, end=end)
-    if problem.dimension == 3 and problem.contacts <= CURVED and seed % 16 in CURVES:
-        q = np.random.default_rng(seed).standard_normal((problem.contacts, 3))
-        end = am.FrictionProblem.from_delassus(problem.W, q, np.array(problem.mu) * 1.2)
-        if seed % 16 == CURVES[0]:
-            return am.write_certificate(problem, am.all_solutions(problem), path)
-        return am.write_certificate(problem, am.diagram(end, base=problem), path, end=end)
-    verdict = am.uniqueness(problem, time_limit=20)
-    if problem.dimension == 2 and verdict.verdict is Verdict.NOT_UNIQUE:
-        return am.write_certificate(problem, am.all_solutions(problem, time_limit=20), path)
+    """The claim of a certificate of a problem, and of what it is."""
+    kind, shape = seed % 16, (problem.contacts, problem.dimension)
+    if kind in LISTS:
+        found = am.all_solutions(problem, time_limit=deadline_of(None, LIMIT))
+        many = "several" if len(found.solutions) > 1 else "one"
+        return am.write_certificate(problem, found, path) + f", {many}"
+    if kind in LOADS + FRICTION:
+        random = np.random.default_rng(seed)
+        factor = random.uniform(0.5, 1.5) if kind in FRICTION else 1.0
+        end = am.FrictionProblem.from_delassus(
+            problem.W, random.standard_normal(shape), factor * np.array(problem.mu)
+        )
+        found = am.diagram(end, base=problem, time_limit=deadline_of(None, LIMIT))
+        claim = am.write_certificate(problem, found, path, end=end)
+        claim += " of load and friction" if kind in FRICTION else " of a load"
+        return claim + (", loops" if any(branch.closed for branch in found) else "")
+    verdict = am.uniqueness(problem, time_limit=deadline_of(None, LIMIT))
     return am.write_certificate(problem, verdict, path)
 
 
@@ -74,18 +87,21 @@ def main() -> None:
     seconds, files, seed = [], [], 0
     with tempfile.TemporaryDirectory() as folder:
         while len(files) < asked.certificates:
-            problem, seed = problem_of(seed), seed + 1
-            path = Path(folder) / f"{seed}.h5"
+            number, seed = seed, seed + 1
+            problem, path = problem_of(number), Path(folder) / f"{number}.h5"
             try:
-                claim = write(problem, seed, path)
-            except am.InvalidInput:
-                count["without a certificate"] += 1
+                claim = write(problem, number, path)
+            except am.InvalidInput as reason:
+                count[f"{problem.dimension}D without a certificate"] += 1
+                print(number, str(reason)[:150], flush=True)
                 continue
             began = time.process_time()
             am.check_certificate(path)  # raises where it is refused
             seconds.append(time.process_time() - began)
             count[f"{problem.dimension}D {claim}"] += 1
             files.append(path)
+            if len(files) % 50 == 0:
+                print(len(files), time.process_time(), dict(count), flush=True)
         told = forge(files, asked.forgeries, Path(folder) / "forged.h5")
     rows = "\n".join(f"| {name} | {number} |" for name, number in sorted(count.items()))
     where = describe()

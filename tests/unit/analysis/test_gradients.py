@@ -214,6 +214,7 @@ def test_cycles_solve_both_systems(monkeypatch):
             assert np.abs(one - other).max() <= 3e-8 * np.abs(other).max()
     assert cycles.iterations < 60
     monkeypatch.setattr("amontons.analysis.gradients.cycles.TOLERANCE", 1e-17)
+    monkeypatch.setattr("amontons.analysis.gradients.cycles.SLOW", 0.0)  # GMRES takes over
     one, other = CycleSystem(at).adjoint(V, R, U).x, direct.adjoint(V, R, U).x
     assert np.abs(one - other).max() <= 1e-8 * np.abs(other).max()  # as s is known to 1e-10
 
