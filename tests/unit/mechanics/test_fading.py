@@ -67,6 +67,19 @@ def test_a_uniform_pressure_is_no_error():
     assert FULL < 0.5  # nodes of a side that ends with the master's bear for themselves
 
 
+def test_where_the_master_ends_within_a_facet_is_no_matter():
+    """A stiff block pressed on a slab, the slave: 5 % between these places with FULL = 0.2."""
+    slab, found = am.Body(am.box((3, 1), (15, 5)), NEO, name="slab"), []
+    for beside in (0.0, 0.05, 0.1):
+        mesh = am.box((1, 0.5), (6, 3), origin=(0.9 + beside, 1))
+        block = am.Body(mesh, am.NeoHookean(10.0, 0.3), name="block")
+        model = am.Model([slab, block], [am.Fix("slab.bottom", 0),
+                                         am.Fix("block.top", (0, -0.02))],
+                         [am.Contact("slab.top", master="block.bottom", mu=0.3)])  # fmt: skip
+        found.append(np.ravel(am.solve(model, check=False).resultant)[1])
+    assert np.ptp(found) < 0.01 * np.abs(found).max()
+
+
 @pytest.mark.parametrize(("dim", "more"), [
     (2, None), (3, None), (2, {"mu": 0.3, "stiffness": 5.0, "stick_stiffness": 3.0}),
     (3, {"mu": 0.3, "mu_across": 0.1, "direction": (1, 0, 0)}),

@@ -15,6 +15,7 @@ from .worst_cells import flattest, turned_corner
 
 Array = NDArray[np.float64]
 FLAT = 0.3  # det F below which a cell is worth a word
+LEFT = 0.5  # of what a node bore for itself, `fading`, below which it is worth a word
 
 
 def places_of_failure(parts: NonlinearParts, u: Array, earlier: Meetings) -> str:
@@ -34,18 +35,12 @@ def _parted(now: Meetings, earlier: Meetings) -> Iterator[str]:
         if here.pair.fold is not None:
             continue
         names = "{!r} faces {!r}".format(*here.pair.names)
-        left = np.flatnonzero(_bearing(before) & ~_bearing(here))
+        left = np.flatnonzero(here.remembered < LEFT * before.remembered)
         if not here.met.any():
             yield f"{names} nowhere: no contact force holds anything there"
         elif len(left):
             place = ", ".join(f"{c:.4g}" for c in here.x[here.slaves[left[0]]])
             yield f"{names} hardly or no more at {len(left)} nodes, as at ({place})"
-
-
-def _bearing(meeting: MortarMeeting) -> NDArray[np.bool_]:
-    """Slaves (nc,) that face enough of the master to bear for themselves."""
-    faint = False if meeting.fading is None else meeting.fading.faint
-    return meeting.met & ~np.asarray(faint)
 
 
 def _flat(parts: NonlinearParts, u: Array) -> Iterator[str]:
