@@ -293,13 +293,13 @@ def sweep(begin, end, indptr, indices, data, inverse, b, x, held, backward):  # 
     """A block Gauss-Seidel sweep on A x = b over the nodes of a chunk that are not held."""
     for step in range(end - begin):
         i = uint64(end - 1 - step if backward else begin + step)
-        if held[i]:
-            continue
         first, last = uint64(indptr[i]), uint64(indptr[i + 1])
         if backward:
             s0, s1, s2 = row_product_back(indices, data, x, first, last)
         else:
             s0, s1, s2 = row_product(indices, data, x, first, last)
+        if held[i]:  # its row is read all the same: gaps break the stream of memory
+            continue
         r0, r1, r2 = b[i, 0] - s0, b[i, 1] - s1, b[i, 2] - s2
         x[i, 0] += inverse[i, 0, 0] * r0 + inverse[i, 0, 1] * r1 + inverse[i, 0, 2] * r2
         x[i, 1] += inverse[i, 1, 0] * r0 + inverse[i, 1, 1] * r1 + inverse[i, 1, 2] * r2
