@@ -3,7 +3,8 @@
     python benchmarks/certificate_files.py [--certificates 1000] [--forgeries 10000]
 
 Random problems of two to six contacts in 2D and 3D: every load and one load; in 2D all
-solutions where there are several, and all branches between two loads.  Each forgery
+solutions where there are several, and all branches between two loads; in 3D of up to three
+contacts all solutions of a load, and over load and friction.  Each forgery
 changes one byte of one of the files at random; one counts as accepted where the checker still
 agrees while W, q, mu, r0, the claim or anything else that the hash covers is another.
 """
@@ -29,6 +30,7 @@ from amontons.io import certificate_checker as checker
 
 REFUSED, HARMLESS, WRONG, CRASHED = "refused", "harmless", "wrong", "crashed"
 RESULTS = Path(__file__).parent / "results"
+CURVED, CURVES = 3, (0, 4, 8)  # contacts in 3D, and seeds: a list, then all branches
 
 
 def problem_of(seed: int) -> am.FrictionProblem:
@@ -49,6 +51,12 @@ def write(problem: am.FrictionProblem, seed: int, path: Path) -> str:
     if problem.dimension == 2 and seed % 16 == 1:
         q = np.random.default_rng(seed).standard_normal((problem.contacts, 2))
         end = am.FrictionProblem.from_delassus(problem.W, q, problem.mu)
+        return am.write_certificate(problem, am.diagram(end, base=problem), path, end=end)
+    if problem.dimension == 3 and problem.contacts <= CURVED and seed % 16 in CURVES:
+        q = np.random.default_rng(seed).standard_normal((problem.contacts, 3))
+        end = am.FrictionProblem.from_delassus(problem.W, q, np.array(problem.mu) * 1.2)
+        if seed % 16 == CURVES[0]:
+            return am.write_certificate(problem, am.all_solutions(problem), path)
         return am.write_certificate(problem, am.diagram(end, base=problem), path, end=end)
     verdict = am.uniqueness(problem, time_limit=20)
     if problem.dimension == 2 and verdict.verdict is Verdict.NOT_UNIQUE:

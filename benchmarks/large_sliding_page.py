@@ -92,9 +92,11 @@ def compared(rows, name):
     seconds = {r["program"]: r["seconds"] for r in rows if r["case"] == name}
     out = []
     if found.get("amontons, exchanged") is not None:
-        out.append([name, "amontons, exchanged",
-                    apart(found.get("amontons"), found["amontons, exchanged"]),
-                    "", "", "", "", "", ""])  # fmt: skip
+        one = found.get("amontons"), found["amontons, exchanged"]
+        two = found.get("amontons, fine"), found.get("amontons, fine, exchanged")
+        at_limit = [limit_of(*both) for both in zip(one, two, strict=True)]
+        out.append([name, "amontons, exchanged", apart(*one), "", "", apart(*two),
+                    apart(*at_limit), "", ""])  # fmt: skip
     for peer, law in (("GetFEM", ""), ("CalculiX", ", law of CalculiX")):
         if peer not in found or "amontons" not in found:
             continue

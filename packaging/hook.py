@@ -6,6 +6,7 @@ and says why.  Editable installs never have them: they follow the sources.
 
 import json
 import os
+import signal
 import subprocess
 import sys
 import tempfile
@@ -17,6 +18,26 @@ from hatchling.builders.hooks.plugin.interface import BuildHookInterface
 HERE = Path(__file__).resolve().parent
 LIMIT = 1200.0  # seconds; some 100 on two cores
 START = b"amontons kernels"  # as in amontons.core.shipped, which needs numba
+
+
+def finished(command: list[str], limit: float) -> subprocess.CompletedProcess[str]:
+    """What a command says within a limit in seconds, else no process of it goes on.
+
+    Raises TimeoutExpired; processes that it has started would compile on for minutes.
+    """
+    pipe = subprocess.PIPE
+    with subprocess.Popen(
+        command, stdout=pipe, stderr=pipe, text=True, start_new_session=True
+    ) as process:
+        try:
+            out, err = process.communicate(timeout=limit)
+        except BaseException:  # Ctrl-C too
+            if sys.platform == "win32":
+                process.kill()
+            else:
+                os.killpg(process.pid, signal.SIGKILL)
+            raise
+    return subprocess.CompletedProcess(command, process.returncode, out, err)
 
 
 class CompiledFunctions(BuildHookInterface):
@@ -48,7 +69,7 @@ class CompiledFunctions(BuildHookInterface):
         sources = str(HERE.parent / "src")
         command = [sys.executable, str(HERE / "compile.py"), str(path), sources]
         try:
-            done = subprocess.run(command, capture_output=True, text=True, timeout=LIMIT)
+            done = finished(command, LIMIT)
         except (OSError, subprocess.SubprocessError) as error:
             return f"{type(error).__name__}: {error}"
         for line in (done.stdout + done.stderr).splitlines():

@@ -99,10 +99,13 @@ class Scaled:
         sizes = [float(np.linalg.norm(root * r, axis=1).max(initial=0.0)) for r in known]
         return max([*sizes, load_size(self.q / root, self.mu, self.reacts)]) or 1.0
 
-    def relative(self, off: Array | float, *known: Array) -> float:
+    def relative(
+        self, off: Array | float, *known: Array, largest: float | None = None
+    ) -> float:
         """A bound of how far scaled reactions are off, each or (nc, d), over `largest`."""
         root = np.sqrt(self.size)[:, None]
-        return float((root * off).max(initial=0.0)) / self.largest(*known)
+        most = self.largest(*known) if largest is None else largest
+        return float((root * off).max(initial=0.0)) / most
 
     def load_shares(self, r: Array) -> tuple[Array, Array]:
         """(load of every contact, its terms without their signs), (nc,) each, at r scaled.

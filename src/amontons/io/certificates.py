@@ -8,7 +8,7 @@ claim and sha256, and what proves the claim:
                  their multipliers, distance: within which of r0 all solutions are, unit of r
     this load    r0, statuses (nc,), tau, sigma, eta (nc, d - 1), pinned: multipliers of every
                  contact about r0, distance
-    all solutions, all branches   see `certificate_lists`
+    all solutions, all branches   see `certificate_lists`, in 3D `certificate_curves`
 """
 
 from __future__ import annotations
@@ -32,7 +32,7 @@ from ..analysis.paths.diagram import Diagram
 from ..analysis.scaled import COPIES
 from ..analysis.solutions.enumerate import Solutions
 from ..analysis.solutions.interval_search import pieces_between
-from ..core.clock import TimeLimit, deadline_of
+from ..core.clock import Deadline, TimeLimit, deadline_of
 from ..core.errors import FileFormatError, InvalidInput, shown
 from ..core.hdf5 import check_file
 from ..linear.dense import dense
@@ -41,6 +41,7 @@ from ..solvers.driver import drive
 from .certificate_checker import Refused, check, digest, proves
 from .certificate_checker.contacts import about
 from .certificate_checker.patterns import tree
+from .certificate_curves import curves_between
 from .certificate_lists import all_branches_between, all_solutions_of
 from .fclib.memory import write_hdf5
 
@@ -62,19 +63,19 @@ def write_certificate(
 ) -> str:  # fmt: skip
     """Write what proves a verdict on a Coulomb problem; the claim, as in the module.
 
-    A complete list of `all_solutions` in 2D is proved as "all solutions", a diagram over the
-    load that is `whole` as "all branches" between problem and `end`.  What the verdict did not
-    need (few contacts are decided by all patterns) is looked for, with a time limit in seconds,
-    by default the work of about a minute.  The global
-    form is condensed.  Raises InvalidInput for a verdict that nothing of this kind proves, or
-    that the checker does not accept, with the reason; nothing is written then.
+    A complete list of `all_solutions` is proved as "all solutions", a diagram that is `whole`
+    as "all branches" between problem and `end`, in 3D over friction too.  What the verdict did
+    not need (few contacts are decided by all patterns) is looked for, with a time limit in
+    seconds, by default the work of about a minute.  The global form is condensed.  Raises
+    InvalidInput for a verdict that nothing of this kind proves, or that the checker does not
+    accept, with the reason; nothing is written then.
     """
     deadline = deadline_of(time_limit, SECONDS)
     local = problem.condensed(deadline)
     W = np.ascontiguousarray(dense(local.W, COPIES))
     q, mu = local.free_velocity, np.array(problem.mu)
     if isinstance(verdict, Solutions):
-        claim, arrays = "all solutions", all_solutions_of(local, verdict, deadline)
+        claim, arrays = "all solutions", _all_solutions(local, W, verdict, deadline)
     elif isinstance(verdict, Diagram):
         claim, arrays = "all branches", _all_branches(local, verdict, end, deadline)
     elif isinstance(verdict, Uniqueness):
@@ -121,21 +122,40 @@ def _one_solution(
     if arrays is None:
         raise InvalidInput(
             f"certificate: expected a verdict of uniqueness that multipliers prove, got "
-            f"{verdict.verdict.value!r}; regions of 3D solutions and motions alone have no "
-            "file format yet; lists are written from all_solutions, branches from diagram"
+            f"{verdict.verdict.value!r}; a 3D solution by regions, and a motion alone, have no "
+            "format yet; lists are written from all_solutions, branches from diagram"
         )
     return "this load", arrays
 
 
-def _all_branches(
-    local: FrictionProblem, diagram: Diagram, end: FrictionProblem | None, deadline: Any
+def _all_solutions(
+    local: FrictionProblem, W: Array, found: Solutions, deadline: Deadline
 ) -> Any:
-    if local.dimension != 2:
-        raise InvalidInput("certificate: expected a 2D diagram; those in 3D have no file yet")
+    if local.dimension == 2:
+        return all_solutions_of(local, found, deadline)
+    if not found.complete:
+        raise InvalidInput(f"certificate: expected a complete list, got {found.reason}")
+    q, mu = local.free_velocity, np.array(local.mu)
+    arrays = curves_between((q, mu), None, W, deadline)
+    if len(arrays["r"]) != len(found.solutions):
+        raise InvalidInput(f"certificate: {len(arrays['r'])} solutions can be told apart, the "
+                           f"list has {len(found.solutions)}")  # fmt: skip
+    return arrays
+
+
+def _all_branches(
+    local: FrictionProblem, diagram: Diagram, end: FrictionProblem | None, deadline: Deadline
+) -> Any:
     if diagram.whole is None or end is None:
         what = "a diagram that is whole" if end else "end=, the problem at the other load"
         raise InvalidInput(f"certificate: expected {what}; {diagram.reason}")
     last = end.condensed(deadline)
+    if local.dimension == 3:
+        W, other = (np.array(dense(one.W, COPIES)) for one in (local, last))
+        if not np.array_equal(W, other):
+            raise InvalidInput("certificate: expected the same W at both ends")
+        ends = ((one.free_velocity, np.array(one.mu)) for one in (local, last))
+        return curves_between(next(ends), next(ends), W, deadline)
     found = pieces_between(local, last, deadline)
     return all_branches_between(local, last, found, deadline)
 

@@ -41,7 +41,8 @@ STEPS = 12  # of Lanczos's method for rho, or of the power iteration: within som
 MISSED = 1.1  # by which rho is taken larger after power iterations, which come from below
 OMEGA = 4 / 3
 LARGEST = 600  # block rows that are inverted whole at most
-JUMP = 50.0  # of the largest couplings from node to node at which parts move on their own
+JUMP = 50.0  # of couplings from node to node at which parts move on their own
+RANK = 6  # of the coupling that stands for a node: of the largest ones some are of flat cells
 WEAK = 0.05  # couplings below this part of the largest ones of both units join nothing
 
 
@@ -113,18 +114,32 @@ class Aggregates:
 
 
 def separates(A: NodeBlocks) -> bool:
-    """True where the stiffness jumps from node to node, or soft cells part strong couplings."""
+    """True where the stiffness jumps from node to node, or soft cells part strong couplings.
+
+    Jumps are those of the sixth largest coupling of a node, of few ones of that in the middle:
+    a flat cell makes a few as large as one likes, stiff material makes most of them so.
+    """
     from scipy.sparse import csgraph
 
-    row, column, squares, largest = _couplings(A, 1)
-    known = largest[column] > 0
-    jumps = largest[row[known]] / largest[column[known]]
+    row, column, squares, _ = _couplings(A, 1)
+    usual = _ranked(A, squares)
+    known = usual[column] > 0
+    jumps = usual[row[known]] / usual[column[known]]
     if jumps.max(initial=0.0) > JUMP**2:
         return True
     whole = sparse.csr_matrix((squares > 0, A.indices, A.indptr), shape=(A.nodes,) * 2)
     strong = sparse.csr_matrix(_strong(A, 1))
     count = csgraph.connected_components
     return bool(count(strong, directed=False)[0] > count(whole, directed=False)[0])
+
+
+def _ranked(A: NodeBlocks, squares: Array) -> Array:
+    """The coupling of every node of which RANK - 1 others are larger, or half of them."""
+    others = np.diff(A.indptr) - 1
+    rank = np.minimum(RANK, (others + 1) // 2)  # its own is the largest
+    row = np.repeat(np.arange(A.nodes), np.diff(A.indptr))
+    descending = squares[np.lexsort((-squares, row))]
+    return np.where(rank > 0, descending[A.indptr[:-1] + rank], 0.0)
 
 
 def _strong(A: NodeBlocks, width: int) -> sparse.csr_array:

@@ -57,7 +57,7 @@ def factor_of_small(matrix: sparse.csc_array) -> SmallFactor | None:
 
 
 def _dense(matrix: sparse.csc_array) -> Solve:
-    factor, pivots, info = lapack.dgetrf(matrix.toarray(), overwrite_a=True)
+    factor, pivots, info = lapack.dgetrf(matrix.toarray(order="F"), overwrite_a=True)
     if info > 0:
         raise SingularOperator(f"matrix: pivot {info} is zero, the operator is singular")
     return lambda b: np.asarray(lapack.dgetrs(factor, pivots, b)[0])

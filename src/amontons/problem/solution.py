@@ -56,6 +56,22 @@ class Outcome(Enum):
         return self.value
 
 
+HAS_TRIED = {  # where the method is 'auto' already
+    Outcome.MAX_ITERATIONS: "Allow more iterations.",
+    Outcome.STAGNATED: "The error no longer falls: loosen the tolerance, or check the problem.",
+    Outcome.NON_FINITE: "The iterates overflowed: check units and friction.",
+    Outcome.BREAKDOWN: "The methods can not go on here: see the detail.",
+}
+IN_STEPS = {  # of large deformations, where no other method is
+    Outcome.MAX_ITERATIONS: "Allow more iterations, or go there in smaller steps.",
+    Outcome.STAGNATED: "The error no longer falls: go there in smaller steps, or loosen the "
+    "tolerance.",
+    Outcome.NON_FINITE: "The iterates overflowed: check units and friction.",
+    Outcome.BREAKDOWN: "See the detail; go there in smaller steps (evolve), or where a body "
+    "jumps with NonlinearNewton(crossing=PathCrossing()).",
+}
+
+
 class StoppedBy(Enum):
     """Who ended a solve with the outcome STOPPED."""
 
@@ -126,9 +142,8 @@ class Convergence(Shown):
         """What the user can do about it, knowing what was found and what was tried."""
         if self.obstruction is not None:
             return self.obstruction.value
-        if self.outcome is Outcome.STAGNATED and self.solver == "Auto":
-            return "The error no longer falls: loosen the tolerance, or check the problem."
-        return self.outcome.advice
+        known = {"Auto": HAS_TRIED, "NonlinearNewton": IN_STEPS}.get(self.solver, {})
+        return known.get(self.outcome, self.outcome.advice)
 
     @property
     def stamp(self) -> str:

@@ -14,12 +14,20 @@ from .contract import Iterate
 
 
 def first_iterate(problem: Problem, start: Any) -> Iterate:
-    """What a problem begins with, or a copy of r and v of an Iterate or a solution."""
+    """What a problem begins with, or a copy of r and v of an Iterate or a solution.
+
+    Without load no reactions are a solution, and errors, relative to it, of all others
+    infinite: solvers can not go down from these.
+    """
     if start is not None and not (hasattr(start, "r") and hasattr(start, "v")):
         raise InvalidInput(
             f"expected a solution or an Iterate, got {type(start).__name__}", ("start",)
         )
-    return Iterate(*problem.start(start), 0)
+    r, v = problem.start(start)
+    q = getattr(problem, "q", None)
+    if q is not None and not np.any(q):
+        r[:] = 0.0
+    return Iterate(r, v, 0)
 
 
 def with_motion(problem: Problem, start: Iterate) -> Iterate:

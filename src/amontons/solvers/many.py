@@ -55,6 +55,8 @@ def solve_many(
     with that number too.
     """
     asked = Asked(tolerance, contact_tolerance, time_limit=time_limit, condense=True)
+    if isinstance(problems, FrictionProblem):
+        raise InvalidInput("expected a list, got one alone; write [it]", ("problems",))
     problems = list(problems)
     begins = _starts(starts, problems)
     workers = _workers(threads)

@@ -17,6 +17,7 @@ from amontons.analysis.certificates.exact_threshold import first_failure
 from amontons.analysis.certificates.status_pieces import Pieces
 from amontons.analysis.multipliers.rounding import determinant_sign, is_positive_definite
 from amontons.analysis.statuses import FREE, MINUS, PLUS, STICK
+from amontons.core.clock import Deadline
 from amontons.core.errors import InvalidInput
 from amontons.mechanics.ready.gallery import box_tower, one_contact_2d
 from amontons.mechanics.ready.hild import hild_triangle, mesh_of_triangle
@@ -206,6 +207,16 @@ def test_bad_input_is_refused():
         critical_friction(one_contact_2d(), time_limit=0)
     with pytest.raises(InvalidInput, match="gap"):
         critical_friction(one_contact_2d(), gap=2)
+
+
+def test_a_search_in_space_counts_what_it_does():
+    """24 descents take more than .05 s; before, hundredths of it were counted."""
+    random = np.random.default_rng(3)
+    A = random.standard_normal((6, 7))
+    problem = am.FrictionProblem.from_delassus(A @ A.T, np.ones((2, 3)), [0.3, 0.3])
+    deadline = Deadline.counted(60.0)
+    critical_friction(problem, time_limit=deadline)
+    assert deadline.time > 0.05
 
 
 @pytest.mark.parametrize("seed", range(8))

@@ -8,8 +8,11 @@ from brute_force_3d import random_problem_3d, solutions_by_brute_force
 from disc_checker import accepted, balance_is_positive, law_is_negative
 
 import amontons as am
-from amontons.analysis.solutions.discs.search import enumerate_discs
+from amontons.analysis.scaled import Scaled
+from amontons.analysis.solutions.discs.search import DiscSearch, enumerate_discs
 from amontons.analysis.solutions.discs.sets import Law, Region, copositive, negative_on_arc
+from amontons.analysis.solutions.multistart import Finder
+from amontons.core.clock import Deadline
 from amontons.mechanics.ready.gallery import random_delassus, sphere_packing
 
 
@@ -89,6 +92,18 @@ def test_the_clock_stops_the_search():
     found = am.all_solutions(am.FrictionProblem.from_delassus(W, q, mu), time_limit=0.3)
     assert not found.complete
     assert "stopped" in found.reason
+
+
+def test_regions_and_arcs_count_what_they_cost():
+    """No region is begun in less time than it takes, and proofs between directions count."""
+    problem = am.FrictionProblem.from_delassus(np.eye(3), [[-1.0, 0.0, 0.0]], [0.5])
+    scaled = Scaled.of(problem)
+    finder = Finder(scaled, np.random.default_rng(0), 1e-10)
+    assert not DiscSearch(scaled, finder, Deadline.counted(1e-3)).affords_step
+    assert DiscSearch(scaled, finder, Deadline.counted(1.0)).affords_step
+    deadline = Deadline.counted(1.0)
+    negative_on_arc(Law(0.5, None), Region("l"), -np.eye(7), 0.0, deadline)
+    assert deadline.time > 1e-4
 
 
 def test_no_load_and_bad_input():

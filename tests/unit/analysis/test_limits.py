@@ -103,6 +103,18 @@ def test_what_never_jams_and_what_is_refused():
     assert "No contact touches" in str(am.jamming_friction(apart))
 
 
+def test_the_search_for_patterns_that_jam_counts_its_programs():
+    """Without a limit of the clock it has an end too: here before all patterns were seen."""
+    random = np.random.default_rng(5)
+    A = random.standard_normal((20, 21))
+    problem = am.FrictionProblem.from_delassus(
+        A @ A.T, np.zeros((10, 2)), random.uniform(0.5, 1, 10)
+    )
+    deadline = Deadline.counted(0.1)
+    found = am.jamming_friction(problem, time_limit=deadline)
+    assert deadline.passed and not found.every and found.examined < 100
+
+
 # ------------------------------------------------------------------ collapse
 def on_one(block, point):
     """A weight that grows on one voussoir."""

@@ -7,9 +7,8 @@ import pytest
 from scipy.optimize import minimize_scalar
 
 import amontons as am
-from amontons.analysis.solutions.discs.load_search import pieces_in_space
+from amontons.analysis.solutions.discs.load_search import LARGEST, pieces_in_space
 from amontons.core.clock import Deadline
-from amontons.core.errors import InvalidInput
 
 
 def problem(W, q, mu):
@@ -167,9 +166,13 @@ def test_a_plane_problem_in_space_has_the_diagram_of_the_plane():
     assert diagram.folds == pytest.approx(known.folds, abs=1e-8)
 
 
-def test_a_closed_branch_off_the_plane_is_seen():
+def test_a_closed_branch_off_the_plane_is_seen(tmp_path):
     start, end = looped(0.01)
     diagram = am.diagram(end, base=start)
+    assert am.write_certificate(start, diagram, tmp_path / "c.h5", end=end) == "all branches"
+    proved = am.check_certificate(tmp_path / "c.h5")
+    assert "of 2 curves" in proved
+    assert proved.endswith("1 with neither end.")
     assert diagram.whole == (0.0, 1.0)
     assert [branch.closed for branch in diagram] == [False, True]
     low, high = diagram.folds
@@ -208,8 +211,11 @@ def test_a_singular_W_proves_nothing():
     assert found.undecided == ((0.0, 1.0),)
 
 
-def test_a_3d_diagram_has_no_certificate_file_yet(tmp_path):
-    start, end = looped(0.1)
-    diagram = am.diagram(end, base=start)
-    with pytest.raises(InvalidInput, match="2D"):
-        am.write_certificate(start, diagram, tmp_path / "c.h5", end=end)
+def test_more_contacts_than_an_interval_takes_are_told():
+    """Nothing is proved between loads, and the reason says so."""
+    nc = LARGEST + 1
+    W = np.eye(3 * nc)
+    a, b = (problem(W, np.tile(q, (nc, 1)), [0.3] * nc) for q in ([-1, 0.1, 0], [-1, 0.2, 0]))
+    diagram = am.diagram(b, base=a, time_limit=Deadline.counted(20.0))
+    assert diagram.whole is None
+    assert f"{nc} contacts: the search of an interval takes up to {LARGEST}" in diagram.reason

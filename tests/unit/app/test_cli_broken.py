@@ -191,6 +191,8 @@ def test_body_that_nothing_holds(tmp_path, monkeypatch):
 
 FLAGS = {
     "no source": (["solve"], ["SOURCE"]),
+    "hard, no deck": (["solve", "example:cube", "--hard"], ["--hard: it is for decks"]),
+    "allow, no deck": (["info", "good.hdf5", "--allow", "X"], ["--allow: it is for decks"]),
     "no file": (["solve", "gone.hdf5"], ["gone.hdf5", "no such file"]),
     "no example": (["solve", "example:cub"], ["cub", "did you mean 'cube'"]),
     "folder": (["solve", "folder"], ["folder"]),

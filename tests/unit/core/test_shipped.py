@@ -1,10 +1,12 @@
 """Kernels that come with the package: used where they fit, and only there."""
 
+import importlib.util
 import json
 import os
 import shutil
 import subprocess
 import sys
+import time
 from contextlib import nullcontext
 from pathlib import Path
 from unittest.mock import Mock
@@ -312,3 +314,32 @@ main(["solve", "example:{example}", "-o", "out", "--quiet"], standalone_mode=Fal
     )  # fmt: skip
     assert done.returncode == 0, done.stderr
     assert "compiles" not in done.stdout
+
+
+@pytest.mark.skipif(not sys.platform.startswith("linux"), reason="looks into /proc")
+def test_a_build_that_takes_too_long_leaves_no_process(tmp_path):
+    """Those that the compiling had started went on for as long as it takes."""
+    pytest.importorskip("hatchling")
+    spec = importlib.util.spec_from_file_location(
+        "hook", Path(__file__).parents[3] / "packaging/hook.py"
+    )
+    hook = importlib.util.module_from_spec(spec)
+    spec.loader.exec_module(hook)
+    note, limit = tmp_path / "number", 0.25
+    while not (note.exists() and note.read_text()):  # a busy machine has not begun by then
+        limit *= 2
+        with pytest.raises(subprocess.TimeoutExpired):
+            hook.finished(["sh", "-c", f"sleep 600 & echo $! > {note}; wait"], limit)
+    state = Path(f"/proc/{note.read_text().strip()}/stat")
+    until = time.monotonic() + 60
+    while goes_on(state) and time.monotonic() < until:
+        time.sleep(0.01)
+    assert not goes_on(state)
+
+
+def goes_on(state):
+    """Whether a process is there, and not dead yet to be asked by its parent."""
+    try:
+        return state.read_text().rpartition(")")[2].split()[0] not in "ZX"
+    except OSError:
+        return False

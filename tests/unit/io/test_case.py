@@ -53,6 +53,13 @@ def test_same_model_as_in_python(write):
     assert case.settings == Settings()
 
 
+def test_a_mark_of_the_byte_order_is_no_part_of_a_case(write):
+    """Editors of Windows put one first."""
+    path = write()
+    path.write_bytes(b"\xef\xbb\xbf" + path.read_bytes())
+    assert read_case(path).title == "press"
+
+
 def test_title_defaults_to_the_name(write):
     path = write('title = "press"', "")
     assert read_case(path).title == path.parent.name

@@ -15,6 +15,7 @@ import amontons as am
 from amontons.app.cli import main
 from amontons.core.errors import InvalidInput
 from amontons.io import certificate_checker as checker
+from amontons.io.certificate_checker.boxes import ARCS, Problem
 from amontons.io.certificate_checker.numbers import positive_definite
 from amontons.mechanics.ready.hild import hild_triangle
 
@@ -349,3 +350,107 @@ def test_the_command_line_writes_a_list_and_checks_it(tmp_path):
     assert done.exit_code == 0, done.output
     assert "all solutions: certificate in" in done.output
     assert "exactly 3:" in run(main, ["check", path]).output
+
+
+# ---------------------------------------------------------------- curves in 3D
+def space_problems(seed, nc=2, rubs=False):
+    """Two loads, and coefficients, of a few contacts in 3D."""
+    random = np.random.default_rng(seed)
+    A = random.standard_normal((3 * nc, 3 * nc))
+    W = A @ A.T / (3 * nc) + 0.1 * np.eye(3 * nc)
+    loads = random.standard_normal((2, nc, 3)) - [0.5, 0, 0]
+    mu = random.uniform(0.2, 1, nc)
+    return [am.FrictionProblem.from_delassus(W * 1e-3, q, mu * by)
+            for q, by in zip(loads, (1.0, 1.5 if rubs else 1.0), strict=True)]  # fmt: skip
+
+
+@pytest.fixture(scope="module")
+def curved(tmp_path_factory):
+    """A file with all solutions between two loads and two coefficients."""
+    path = tmp_path_factory.mktemp("curves") / "c.h5"
+    start, end = space_problems(1, rubs=True)
+    diagram = am.diagram(end, base=start)
+    assert am.write_certificate(start, diagram, path, end=end) == "all branches"
+    assert f"of {len(diagram)} curves (0.000000 to 1.000000)" in am.check_certificate(path)
+    return path.read_bytes()
+
+
+def first_excluded(file):
+    """Say of the first tube that it is excluded."""
+    tree = file["tree"][()]
+    tree[np.argmax(tree == -2)] = -1
+    file["tree"].write_direct(tree)
+
+
+FORGED_CURVES = {
+    "a tube less": first_excluded,
+    "other divisions": lambda file: turned(file, "tree"),
+    "no multipliers": lambda file: file["y"].write_direct(0 * file["y"][()]),
+    "other multipliers": lambda file: turned(file, "y"),
+    "other centres": lambda file: file["x"].write_direct(file["x"][()] * 1.5 + 0.1),
+    "another load": lambda file: flipped(file, "q"),
+    "another end": lambda file: flipped(file, "end"),
+    "more friction": lambda file: file["mu_end"].write_direct(file["mu_end"][()] * 3),
+    "another W": lambda file: flipped(file, "W"),
+    "another curve": lambda file: file["r"].write_direct(file["r"][()] * 1.1),
+    "nearer": lambda file: file["distance"].write_direct(np.array(file["distance"][()] / 2)),
+    "a longer span": lambda file: file["span"].write_direct(np.array([0.0, 1.1])),
+    "no number": lambda file: file["x"].write_direct(file["x"][()] * np.nan),
+    "much too large": lambda file: file["x"].write_direct(file["x"][()] + 1e200),
+}
+
+
+@pytest.mark.parametrize("forgery", FORGED_CURVES)
+@pytest.mark.filterwarnings("ignore::RuntimeWarning")  # of numbers that are much too large
+def test_forged_curves_are_found(tmp_path, curved, forgery):
+    path = tmp_path / "c.h5"
+    path.write_bytes(curved)
+    reseal(path, FORGED_CURVES[forgery])
+    with pytest.raises(InvalidInput, match="refused"):
+        am.check_certificate(path)
+
+
+def test_all_solutions_of_a_load_in_space_are_proved(tmp_path):
+    """Three solutions of one contact: W couples its normal with one tangent."""
+    W = np.array([[1.0, 0.9, 0.0], [0.9, 1.0, 0.0], [0.0, 0.0, 1.0]])
+    problem = am.FrictionProblem.from_delassus(W, [[0.1, 0.5, 0.05]], [2.0])
+    found = am.all_solutions(problem)
+    assert len(found) == 3
+    assert am.write_certificate(problem, found, tmp_path / "c.h5") == "all solutions"
+    assert am.check_certificate(tmp_path / "c.h5").endswith(" of 3.")
+    with h5py.File(tmp_path / "c.h5") as file:
+        for r in file["r"][()]:
+            assert min(np.abs(r - s.r).max() for s in found.solutions) <= file["distance"][()]
+
+
+def test_boxes_that_hold_a_solution_are_never_excluded():
+    """Whatever the multipliers: points of the law in boxes of all kinds."""
+    random = np.random.default_rng(0)
+    W, mu = np.array(space_problems(3)[0].W), np.array([0.4, 0.0])
+    for _ in range(40):
+        arc = ARCS[random.integers(4)]
+        share = random.uniform(0, 1)
+        e = (1 - share) * np.array(arc[0]) + share * np.array(arc[1])
+        e /= np.linalg.norm(e)
+        r = np.array([[1.0, *(-0.4 * e)], [0.5, 0, 0]])
+        u = np.array([[0, *(random.uniform(0, 1) * e)], [0, *random.standard_normal(2)]])
+        q = u - (W @ r.ravel()).reshape(2, 3)
+        checked = Problem(W, q, mu)
+        for letters in ("..", "lo", "co", ".o", "l.", "c."):
+            y = random.standard_normal((500, 2, 3)) * np.exp(random.uniform(-3, 3, (500, 2, 3)))
+            y[::2, :, 0] = -np.abs(y[::2, :, 0])
+            y[:, [x != "l" for x in letters], 1:] = 0.0
+            boxes = [(letters, (arc, ARCS[0]), (0.0, 0.0))] * 500
+            assert not checked.excluded(boxes, y).any()
+
+
+def test_the_command_line_proves_diagrams(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    hild = ["follow", "example:hild", "--from", "0.5", "--no-figures", "-o", "out"]
+    ran = CliRunner().invoke(main, [*hild, "--all", "--certificate", "c.h5"])
+    assert ran.exit_code == 0
+    assert "all branches: certificate in c.h5" in ran.output
+    assert "all loads between two" in am.check_certificate("c.h5")
+    ran = CliRunner().invoke(main, [*hild, "--certificate", "d.h5"])
+    assert ran.exit_code == 2
+    assert "--all" in ran.output

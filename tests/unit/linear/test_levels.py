@@ -241,3 +241,21 @@ def test_levels_heed_jumps_of_the_stiffness(ratio, geometric):
     assert factor.iterations <= 20
     given = am.GeometricMultigrid(problem.levels).factor(problem.M, modes)
     assert (given.hierarchy.geometric > 1) == geometric
+
+
+def test_a_flat_cell_is_no_jump_of_the_stiffness():
+    """One node within a hundredth of its neighbour: couplings grow, levels of the mesh stay."""
+    mesh = am.refined(am.box((1, 1, 1), cells=4, kind="tet"))
+    near = np.linalg.norm(mesh.points - [0.375, 0.5, 0.5], axis=1).argmin()
+    points = np.array(mesh.points)
+    points[near] += 0.99 * (np.array([0.5, 0.5, 0.5]) - points[near])
+    model = am.Model(
+        [am.Body(dataclasses.replace(mesh, points=points), LAW)],
+        [am.Fix("top", (0, 0, -0.01))],
+        [am.Contact("bottom", am.Plane((0, 0, 1), (0, 0, 0)), mu=0.3)],
+    )
+    problem = model.assemble()
+    A = problem.hierarchy.levels[0].A
+    size = np.sqrt(np.einsum("kij,kij->k", A.data, A.data))
+    assert size.max() > 50 * np.median(size)
+    assert problem.hierarchy.geometric == len(problem.levels) + 1

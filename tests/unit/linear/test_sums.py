@@ -4,7 +4,14 @@ import numpy as np
 import pytest
 from scipy import sparse
 
-from amontons.linear.sums import among, by_components, in_rows, sum_of_blocks, sum_of_products
+from amontons.linear.sums import (
+    among,
+    by_components,
+    in_rows,
+    rows_of_products,
+    sum_of_blocks,
+    sum_of_products,
+)
 
 
 def some(n, m, seed):
@@ -37,6 +44,19 @@ def test_products_add_up():
     alone = some(6, 8, 5)
     wanted = (a @ b + c @ e + alone).toarray()
     same(sum_of_products([(a, b), (c, e), (None, alone)], (6, 8)), wanted)
+    assert sum_of_products([], (6, 8)).nnz == 0
+
+
+def test_rows_go_on_as_they_are():
+    every, wide = sparse.csr_array(np.ones((7, 2))), some(2, 9, 6)  # fills up
+    found = rows_of_products([(every, wide), (None, some(7, 9, 7))], (7, 9))
+    wanted = (every @ wide + some(7, 9, 7)).toarray()
+    same(found.matrix, wanted)
+    same((-found.times(np.arange(7.0))).matrix, -np.arange(7.0)[:, None] * wanted)
+    same(sum_of_products([(some(4, 7, 8), found)], (4, 9)), some(4, 7, 8) @ wanted)
+    chosen = np.array([0, 3, 6])
+    same(among(rows_of_products([(None, some(9, 9, 9))], (9, 9)), chosen),
+         some(9, 9, 9).toarray()[np.ix_(chosen, chosen)])  # fmt: skip
 
 
 def test_components_repeat_a_matrix_and_leave_out_what_is_held():

@@ -116,6 +116,21 @@ def test_slivers_leave_the_residual_exact(width):
     assert np.ptp(near, axis=0).max() < 1e-11 * np.abs(near).max()
 
 
+@pytest.mark.parametrize("width", [1e-3, 1e-7])
+def test_motion_since_a_sliver_is_no_extrapolation_of_it(width):
+    """Bodies deform by 0.01 while they slide by 0.15: averages over a strip make more of it."""
+    problem, v = sliver(width)
+    parts, rng = problem.parts, np.random.default_rng(8)
+    before = problem.displacement(v)
+    now = before + 0.01 * rng.standard_normal(before.shape)
+    now[: parts.ends[0], 0] -= 0.15
+    here, earlier = parts.meet(now).parts[0], parts.meet(before).parts[0]
+    grown = here.met & earlier.met & (earlier.remembered < 1e-3)
+    assert grown.any()
+    motion = here.motion(earlier)[grown]
+    np.testing.assert_allclose(motion[:, :2] - (-0.15, 0), 0, atol=0.04)
+
+
 def round_end(cells, name, *, up):
     """A block with a round end at the origin, above or below."""
     mesh = am.box((1.0,) * 3, cells)

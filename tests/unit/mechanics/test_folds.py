@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 from folded_meshes import fork, hairpin
-from tangent_checker import checked_tangents
+from tangent_checker import FOURTH, checked_tangents
 
 import amontons as am
 from amontons.mechanics.contact.facing import Skin
@@ -107,16 +107,18 @@ def test_a_folded_beam_is_as_with_two_surfaces():
     np.testing.assert_allclose(found[0], found[1], rtol=1e-7, atol=1e-10)
 
 
-def test_the_tangent_is_exact():
-    for mesh, law in ((hairpin(), 0.3), (slotted(), 0.3)):
-        name = "top" if "press" in mesh.surfaces else "all"
-        model = am.Model([am.Body(mesh, NEO)], [am.Fix("left", 0)],
-                         [am.Contact(name, master=name, mu=law)])  # fmt: skip
-        dofs = large_deformation(model).parts.X.size
-        rng = np.random.default_rng(3)
-        before = 0.004 * rng.standard_normal(dofs)
-        problem = large_step(model, np.zeros(dofs), np.zeros(dofs), before)
-        # couples across a gap of six facets bend fast: differences of a part of the length
-        draws = (rng.standard_normal((2, problem.unknowns)) * [[0.004], [0.008]]
-                 for _ in range(10))  # fmt: skip
-        assert checked_tangents(problem, draws) > 5
+@pytest.mark.parametrize("of", [hairpin, slotted, lambda: slotted(3), lambda: slotted(3, 2)])
+def test_the_tangent_is_exact(of):
+    """In space the slot's root and the arms' ends are seen edge-on; sides share middles."""
+    mesh = of()
+    name = "top" if "press" in mesh.surfaces else "all"
+    model = am.Model([am.Body(mesh, NEO)], [am.Fix("left", 0)],
+                     [am.Contact(name, master=name, mu=0.3)])  # fmt: skip
+    dofs = large_deformation(model).parts.X.size
+    rng = np.random.default_rng(3)
+    before = 0.004 * rng.standard_normal(dofs)
+    problem = large_step(model, np.zeros(dofs), np.zeros(dofs), before)
+    # couples across a gap of six facets bend fast, as what fades does: by fourth order
+    draws = (rng.standard_normal((2, problem.unknowns)) * [[0.004], [0.008]]
+             for _ in range(6 if mesh.dim == 2 else 3))  # fmt: skip
+    assert checked_tangents(problem, draws, FOURTH) >= (4 if mesh.dim == 2 else 2)

@@ -3,8 +3,10 @@
 from dataclasses import replace
 
 import numpy as np
+import pytest
 
 import amontons as am
+from amontons.solvers.newton import nonlinear
 
 
 def die(cells, radius=1.0):
@@ -53,3 +55,46 @@ def test_who_is_the_master_matters_less_on_finer_meshes():
         assert (one[8:, 0] < -0.25 * one[8:, 1]).all()
     assert apart[1].max() < 0.01
     assert (apart[1] < 0.5 * apart[0]).all()
+
+
+def coming_down(slab, cells):
+    """A die that comes down by 0.1 until t = 1, then goes along by 0.1 per unit of time."""
+    low = am.Body(am.box((3, 2), slab), am.NeoHookean(1.0, 0.32), name="slab")
+    up = am.Body(die(cells), am.NeoHookean(10.0, 0.32), name="die")
+    top = lambda x, t: 0.1 * max(t - 1, 0), lambda x, t: -0.1 * min(t, 1)  # noqa: E731
+    return am.Model([low, up], [am.Fix("slab.bottom", 0), am.Fix("die.top", top)],
+                    [am.Contact("die.bottom", master="slab.top", mu=0.3)])  # fmt: skip
+
+
+@pytest.mark.parametrize("cells", [20, 60])
+def test_newton_steps_do_not_grow_with_contacts(cells):
+    """Two steps down, one along; by the tangent alone up to 8 and 14 Newton steps."""
+    model = coming_down((cells, 6), (cells, 4))
+    steps = list(am.evolve(model, am.QuasiStatic(0.5), until=1.5))
+    counts = [step.solution.convergence.iterations for step in steps]
+    assert max(counts) <= 6
+    assert min((step.state.force[:, 0] > 0).sum() for step in steps) >= cells / 5
+
+
+def test_large_bodies_begin_with_cycles_of_multigrid(monkeypatch):
+    """Where these do not get there, the tangent does, by more Newton steps."""
+    low = am.Body(am.box((3, 1.6, 1), (12, 8, 3)), am.NeoHookean(1.0, 0.32), name="slab")
+    mesh = am.box((0.8, 1.0, 0.5), (8, 8, 2), origin=(1.0, 0.3, 1.0))
+    points = mesh.points.copy()
+    points[:, 2] += (points[:, 0] - 1.4) ** 2 * (1.5 - points[:, 2])
+    up = am.Body(replace(mesh, points=points), am.NeoHookean(10.0, 0.32), name="die")
+    held = am.Fix("slab.bottom", 0), am.Fix("die.top", (0.02, 0, -0.04))
+    model = am.Model([low, up], held, [am.Contact("die.bottom", master="slab.top", mu=0.3)])
+    monkeypatch.setitem(nonlinear.LARGE, 3, 1_000)
+
+    def solved():
+        return next(iter(am.evolve(model, am.QuasiStatic(1.0), until=1.0)))
+
+    first = solved()
+    monkeypatch.setattr(nonlinear, "CYCLES", 0)
+    monkeypatch.setattr(nonlinear, "ROUGH", 0.0)
+    other = solved()
+    counts = [step.solution.convergence.iterations for step in (first, other)]
+    assert counts[0] <= 5 < counts[1], counts
+    size = np.abs(first.state.force).max()
+    np.testing.assert_allclose(other.state.force, first.state.force, atol=1e-6 * size)

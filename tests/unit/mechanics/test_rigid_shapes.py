@@ -47,10 +47,47 @@ def test_faces_look_outwards_and_turn_anticlockwise():
         assert np.cross(b - a, c - b) @ normal > 0
 
 
-@pytest.mark.parametrize("points", [np.zeros((3, 3)), np.eye(4)[:, :3] * [1, 1, 0]])
+CORNER = np.vstack([np.zeros(3), np.eye(3)])
+
+
+@pytest.mark.parametrize(
+    "points",
+    [np.zeros((3, 3)), np.eye(4)[:, :3] * [1, 1, 0], CORNER * 1e200, CORNER * 1e-200],
+)
 def test_points_in_a_plane_are_refused(points):
     with pytest.raises(am.InvalidInput, match="points"):
         Polyhedron(points)
+
+
+@pytest.mark.parametrize("grid", [2, 5])
+def test_faces_whose_coordinates_were_rounded_are_whole(grid):
+    """Taken for two triangles, a face carried on one of them alone, and a stack rocked."""
+    at = np.array(list(itertools.product(np.linspace(-0.5, 0.5, grid), repeat=3)))
+    turn = Rotation.from_euler("xyz", [0.3, 0.2, 0.5])
+    shape = Polyhedron(np.round(turn.apply(at * [0.4, 0.4, 0.2]), 6))
+    assert len(shape.facets.loops) == 6
+    assert shape.volume == pytest.approx(0.032, rel=1e-4)
+    flat = np.roll(turn.inv().as_quat(), 1)
+    bodies = [
+        RigidBody(shape, position=(0.02 * k, 0, 0.1 + 0.2 * k), orientation=flat)
+        for k in range(2)
+    ]
+    *_, last = am.evolve_rigid(RigidBodies(bodies, [am.Plane((0, 0, 1))]), step=5e-3, until=0.5)
+    upper = last.meetings.master >= 0
+    assert np.ptp(last.meetings.points[upper, 0]) > 0.37  # all of the overlap carries
+    np.testing.assert_allclose(last.position, [b.position for b in bodies], atol=1e-4)
+    np.testing.assert_allclose(last.rotation @ turn.as_matrix(), [np.eye(3)] * 2, atol=1e-4)
+
+
+def test_a_column_with_many_sides_stands():
+    """Faces of more than 64 corners were cut off after these, and carried on a part."""
+    angle = np.linspace(0, 2 * np.pi, 161)[1:]
+    ring = np.column_stack([0.1 * np.cos(angle), 0.1 * np.sin(angle)])
+    column = Polyhedron(np.vstack([np.column_stack([ring, np.full(160, z)]) for z in (0, 0.4)]))
+    slab = RigidBody(cuboid((1, 1, 0.1)), 1e4)
+    found = met([slab, RigidBody(column, position=(0, 0, 0.25))], near=1e-6)
+    assert len(found.gaps) == 160
+    np.testing.assert_allclose(found.points.mean(axis=0), [0, 0, 0.05], atol=1e-9)
 
 
 def met(bodies, planes=(), near=1.0):

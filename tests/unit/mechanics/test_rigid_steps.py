@@ -264,6 +264,15 @@ def test_a_jolt_at_a_joint_is_an_impact_without_rebound():
     assert end.energies.kinetic == pytest.approx((0.5 * rod.mass) ** 2 / (2 * about), rel=1e-3)
 
 
+def test_balls_that_have_hit_go_on_together():
+    """A row that nothing loads any more: q is 0, and no start makes an error finite."""
+    row = [RigidBody(Ball(0.1), position=(0.2 * k, 0, 0)) for k in range(3)]
+    first = RigidBody(Ball(0.1), position=(-0.205, 0, 0), velocity=(1, 0, 0))
+    system = RigidBodies([first, *row], (), mu=0.0, gravity=(0, 0, 0))
+    *_, last = evolve_rigid(system, step=1e-3, until=0.03)
+    np.testing.assert_allclose(last.state.motion.velocity[:, 0], 0.25, atol=1e-6)
+
+
 def test_impacts_at_contacts_that_part_gain_no_energy():
     """The middle ball leaves the first when the third one hits it; nothing is lost either."""
     R, speeds = 0.1, (0.0, 1.0, -2.0)

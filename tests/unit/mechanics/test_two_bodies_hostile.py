@@ -7,6 +7,7 @@ import pytest
 
 import amontons as am
 from amontons.mechanics.meshes import Facets
+from amontons.mechanics.model.large_deformation import large_deformation
 
 NEO = am.NeoHookean(1.0, 0.3)
 
@@ -240,6 +241,21 @@ def test_facets_of_held_nodes_alone_that_are_passed_are_told(held, count):
             assert "make the other surface the slave" in found[0].message
 
 
+@pytest.mark.parametrize(("aside", "told"), [(0.0, 0), (5.0, 1)])
+def test_a_slave_that_no_master_faces_is_told(aside, told):
+    """Its contacts were open, and nothing said that they could not be anything else."""
+    law = am.NeoHookean(1.0, 0.3)
+    bodies = [am.Body(am.box((1, 1), 2), law, name="low"),
+              am.Body(am.box((1, 1), 2, origin=(aside, 1.1)), law, name="up")]  # fmt: skip
+    supports = [am.Fix("low.bottom", 0), am.Fix("up.top", (0, -0.05))]
+    contact = am.Contact("up.bottom", master="low.top", mu=0.3)
+    warned = [w.message for w in am.solve(am.Model(bodies, supports, [contact])).warnings
+              if w.name == "unfaced-slave"]  # fmt: skip
+    assert len(warned) == told
+    if told:
+        assert "'up.bottom' reaches from [5.0, 1.05] to [6.0, 1.05]" in warned[0]
+
+
 def test_a_slave_that_is_held_everywhere_says_what_to_do():
     law = am.NeoHookean(1.0, 0.3)
     bodies = [am.Body(am.box((1, 1), 2), law, name="low"),
@@ -247,3 +263,17 @@ def test_a_slave_that_is_held_everywhere_says_what_to_do():
     supports = [am.Fix("low.bottom", (0, 0.05)), am.Fix("up.bottom", 0), am.Fix("up.top", 0)]
     with pytest.raises(am.InvalidInput, match="make the master the slave"):
         am.solve(am.Model(bodies, supports, [am.Contact("up.bottom", master="low.top", mu=0)]))
+
+
+def test_a_corner_that_is_inside_out_is_named_where_no_integration_point_is():
+    """det F of a bilinear square is 1 - 0.6 (x + y): -0.2 at a corner, else at least 0.054."""
+    square = am.Body(am.box((1, 1), 1), NEO, name="lower")
+    problem = large_deformation(am.Model([square], [am.Fix("lower.left", 0)], [
+        am.Contact("lower.top", am.Plane((0, -1), (0, 5)), mu=0)]))  # fmt: skip
+    u = np.zeros(square.mesh.points.shape)
+    u[(square.mesh.points == 1).all(axis=1)] = -0.6
+    v = u.ravel()[problem.parts.free]
+    assert "the corner at (1, 1) of cell 0 at (0.5, 0.5) is turned inside out, det F = -0.2 " \
+        "there, in body 'lower'" in problem.remark(v)  # fmt: skip
+    assert "pressed to det F = 0.0536" in problem.remark(v)
+    assert "corner" not in problem.remark(v / 2)

@@ -131,6 +131,13 @@ def test_start_from_the_solution_needs_no_iteration():
     np.testing.assert_array_equal(again.r, first.r)
 
 
+def test_without_load_no_start_is_in_the_way():
+    """Its error is infinite, whatever it is, from where Newton's method had overflowed."""
+    problem = FrictionProblem.from_delassus(2 * np.eye(3), np.zeros((1, 3)), [0.5])
+    solution = drive(problem, am.SemismoothNewton(), start=Iterate(np.array([[1e-13, 0, 0]])))
+    assert solution.converged and not solution.r.any()
+
+
 def test_start_is_not_modified():
     start = Iterate(np.array([[0.3, 0.0, 0.0]]))
     assert drive(PROBLEM, GaussSeidel(), start=start).converged

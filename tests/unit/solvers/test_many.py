@@ -91,3 +91,9 @@ def test_one_problem_and_many_take_the_same_compiled_function(problems):
     known = set(solve_range.signatures)
     am.solve_many(problems[:5], tolerance=1e-9)
     assert set(solve_range.signatures) == known
+
+
+def test_one_problem_alone_is_refused():
+    problem = am.FrictionProblem.from_delassus(np.eye(2), [[-1.0, 0]], [0.5])
+    with pytest.raises(am.InvalidInput, match=r"problems: .*write \[it\]"):
+        am.solve_many(problem)

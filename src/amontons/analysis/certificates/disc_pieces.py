@@ -41,7 +41,7 @@ BELOW = (0.1, 0.03, 0.01, 0.003, 5e-4)  # parts of t by which it is below in a c
 FALL = 1e-5  # relative, by which t must fall
 STARTS = 24  # first patterns of few contacts
 ROUNDS = 60  # of changes from one pattern
-WORK = 4.0  # operations of a round per cube of the rows
+WORK = (3e7, 4.0)  # operations of a round, and per cube of the rows
 
 
 @dataclass(frozen=True, eq=False)
@@ -287,15 +287,15 @@ class _Form:
         self, states: States, directions: Array, deadline: Deadline
     ) -> tuple[float, States, Array]:
         """The pattern after changes that make t fall, one after another."""
-        states = self.allowed(states)
+        states, work = self.allowed(states), WORK[0] + WORK[1] * float(len(self.W)) ** 3
         first = self.threshold(states, directions)
         t = np.inf if first is None else first[0]
         if not np.isfinite(t):
             return t, states, directions
         for _ in range(ROUNDS):
-            if not deadline.affords(WORK * len(self.W) ** 3):
+            if not deadline.affords(work):
                 break
-            deadline.spend(WORK * len(self.W) ** 3)
+            deadline.spend(work)
             better = self._round(states, directions, t)
             if better is None:
                 break

@@ -22,6 +22,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -33,6 +34,7 @@ from ...core.clock import Deadline
 
 Array = NDArray[np.float64]
 Solve = Callable[[Array], Array]
+Point = tuple[Array, Array, Array, float]  # x, y, z, lam
 BOUNDARY = 0.99  # part of the way to the boundary of the cones that a step goes
 STEPS = 80
 SHORT = 1e-6  # length of a step that gets nowhere
@@ -172,38 +174,50 @@ def iterates(
     y, z, lam = unit.copy(), np.zeros(n), 0.0
     for _ in range(STEPS):
         deadline.pay(_cost(matrix, is_full))
-        F = _Scaling.of(cones, x, y)
-        lamda = F.apply(x)
-        inverse = F.inverse_square(m)
-        factor = _factor(A @ (inverse @ A.T))
-        if factor is None:
+        step = _step(A, cones, e, (x, y, z, lam))
+        if step is None:
             return
-        right = inverse @ e
-        b = factor(A @ right)
-        turned = inverse @ (e - A.T @ b)
-        off, miss, left = A.T @ z - lam * e - y, A @ x - z, 1.0 - float(e @ x)
-        mean = float(x @ y) / cones.count
-        sigma, corrector, length = 0.0, np.zeros(m), 0.0
-        dx, dy, dz, d_lam = x, y, z, lam
-        for phase in range(2):
-            keep = 1.0 - sigma
-            goal = sigma * mean * unit - cones.product(lamda, lamda) - corrector
-            g = F.apply(cones.divide(lamda, goal)) - keep * off
-            a = factor(A @ (inverse @ g) + keep * miss)
-            d_lam = (keep * left - float(e @ (inverse @ (g - A.T @ a)))) / float(e @ turned)
-            dz = a + d_lam * b
-            dx = inverse @ (g - A.T @ dz + d_lam * e)
-            dy = A.T @ dz - d_lam * e + keep * off
-            length = min(cones.room(x, dx), cones.room(y, dy))
-            if phase == 0:
-                end = float((x + length * dx) @ (y + length * dy))
-                sigma = min(max(end / float(x @ y), 0.0), 1.0) ** 3
-                corrector = cones.product(F.apply(dx), F.apply(dy, inverse=True))
+        (dx, dy, dz, d_lam), length = step
         length = min(1.0, BOUNDARY * length)
         if not (np.isfinite(dx).all() and np.isfinite(dy).all()) or length < SHORT:
             return
         x, y, z, lam = x + length * dx, y + length * dy, z + length * dz, lam + length * d_lam
         yield x, z, lam
+
+
+def _step(A: Any, cones: Cones, e: Array, point: Point) -> tuple[Point, float] | None:
+    """The step from (x, y, z, lam) and the part of it up to the cones; None: A is singular."""
+    x, y, z, lam = point
+    m = len(e)
+    F = _Scaling.of(cones, x, y)
+    lamda = F.apply(x)
+    inverse = F.inverse_square(m)
+    factor = _factor(A @ (inverse @ A.T))
+    if factor is None:
+        return None
+    b = factor(A @ (inverse @ e))
+    turned = inverse @ (e - A.T @ b)
+    off, miss, left = A.T @ z - lam * e - y, A @ x - z, 1.0 - float(e @ x)
+
+    def direction(goal: Array, keep: float) -> Point:
+        """To complementarity `goal`, and `keep` of what is missing taken away."""
+        g = F.apply(cones.divide(lamda, goal)) - keep * off
+        a = factor(A @ (inverse @ g) + keep * miss)
+        d_lam = (keep * left - float(e @ (inverse @ (g - A.T @ a)))) / float(e @ turned)
+        dz = a + d_lam * b
+        dx = inverse @ (g - A.T @ dz + d_lam * e)
+        return dx, A.T @ dz - d_lam * e + keep * off, dz, d_lam
+
+    square = cones.product(lamda, lamda)
+    dx, dy, _, _ = direction(-square, 1.0)
+    length = min(cones.room(x, dx), cones.room(y, dy))
+    end = float((x + length * dx) @ (y + length * dy))
+    sigma = min(max(end / float(x @ y), 0.0), 1.0) ** 3
+    corrector = cones.product(F.apply(dx), F.apply(dy, inverse=True))
+    mean = float(x @ y) / cones.count
+    goal = sigma * mean * cones.identity(m) - square - corrector
+    dx, dy, dz, d_lam = direction(goal, 1.0 - sigma)
+    return (dx, dy, dz, d_lam), min(cones.room(x, dx), cones.room(y, dy))
 
 
 def _factor(N: sparse.csr_array | Array) -> Solve | None:

@@ -25,6 +25,7 @@ DENSE = 400  # rows up to which all eigenvalues are computed
 KEPT = 40  # largest ones that count beyond
 DEPTH = 3  # products of the block Krylov space in which they are looked for
 TILE = 256  # rows of a matrix and its transpose that fit into the cache together
+EIGENVALUES = (2e6, 2e3, 1.0)  # operations: always, per square and cube of rows
 SHARPENED = 4  # times that the largest eigenvalue is looked for before a proof
 
 
@@ -54,7 +55,10 @@ class Pencil(ABC):
     def operations(self) -> float:
         """Of one evaluation: all eigenvalues, or a factorisation and products with it."""
         n = float(self.size)
-        return 8.0 * n**3 if n <= DENSE else n**3 / 3 + 5.0 * DEPTH * KEPT * n**2
+        if n > DENSE:
+            return n**3 / 3 + 5.0 * DEPTH * KEPT * n**2
+        always, square, cube = EIGENVALUES
+        return always + square * n**2 + cube * n**3
 
     def factor(self, x: Array) -> Array | None:
         """L (size, size) of A = L L^T, None where A is indefinite."""

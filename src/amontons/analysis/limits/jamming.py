@@ -31,7 +31,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import sparse
 
-from ...core.clock import Deadline, deadline_of, now
+from ...core.clock import NEVER, Deadline, deadline_of, now
 from ...core.errors import InvalidInput, SingularOperator, UnsupportedLaw
 from ...core.faces import Told
 from ...problem.friction import Form, FrictionProblem
@@ -45,6 +45,7 @@ EPSILON = float(np.finfo(float).eps)
 ROUNDS = 60  # of cuts at one friction
 PATTERNS = 4_000  # linear programs of the search over open contacts
 WORK = 30.0  # seconds of it by default
+PROGRAM = (3e7, 3e3)  # operations of a program, and per row and column
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -113,12 +114,12 @@ def jamming_friction(
     if not kept.any():
         return Jamming(np.inf, np.inf, True, None, None, 0.0, None, 0.0, shape, 0,
                        now() - began, "No contact touches without load.")  # fmt: skip
-    search = _Search(problem, shape, kept)
+    search = _Search(problem, shape, kept, deadline)
     low, up, r, v, margin = search.bounds(kept, np.zeros_like(kept))
     closed, every, reason = kept, False, ""
     while True:
         start = min(up, LARGEST) * (1 - GAP)
-        found, done = search.any_pattern(start, kept, deadline)
+        found, done = search.any_pattern(start, kept)
         if found is None:
             every = done
             break
@@ -152,7 +153,10 @@ def _condenses(problem: FrictionProblem) -> bool:
 class _Search:
     """The linear programs: z with v = V z, E z = 0, in scaled variables."""
 
-    def __init__(self, problem: FrictionProblem, shape: Array, kept: Mask) -> None:
+    def __init__(
+        self, problem: FrictionProblem, shape: Array, kept: Mask, deadline: Deadline = NEVER
+    ) -> None:
+        self.deadline = deadline
         self.nc, self.d = problem.contacts, problem.dimension
         self.shape, self.kept, self.examined = shape, kept, 0
         normal = np.arange(self.nc) * self.d
@@ -252,6 +256,7 @@ class _Search:
         from scipy.optimize import linprog
 
         p = self.V.shape[1]
+        self.deadline.spend(PROGRAM[0] + PROGRAM[1] * float(len(cuts) * p))
         contact = np.array([i for i, _ in cuts])
         way = np.array([s for _, s in cuts])
         rows = [self.V[contact * self.d]]
@@ -281,9 +286,7 @@ class _Search:
         np.add.at(r[:, 1:], contact, -(weight * factor)[:, None] * way)
         return found.x[:p], r / self.root, float(found.x[p])
 
-    def any_pattern(
-        self, mu: float, kept: Mask, deadline: Deadline
-    ) -> tuple[tuple[Mask, Mask] | None, bool]:
+    def any_pattern(self, mu: float, kept: Mask) -> tuple[tuple[Mask, Mask] | None, bool]:
         """((closed, undecided) of a pattern that may jam at mu, or None; has it ended?)."""
         none = np.zeros_like(kept)
         stack = [(none, none)]
@@ -291,7 +294,7 @@ class _Search:
         while stack:
             closed, open_ = stack.pop()
             count += 1
-            if count > PATTERNS or deadline.passed:
+            if count > PATTERNS or self.deadline.passed:
                 return None, False
             undecided = kept & ~closed & ~open_
             if not (closed | undecided).any():

@@ -160,6 +160,7 @@ def find_multipliers(
     each = step_operations(Z, families)
     if not deadline.affords(each):
         return _not_begun(Z, families, LmiOutcome.TIME_LIMIT)
+    deadline.spend(each)  # the beginning takes a step
     program = Program(Z, tuple(families))
     try:
         point = start(program)

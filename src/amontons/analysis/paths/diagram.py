@@ -174,7 +174,8 @@ class _Drawn:
         except TimeUp as reason:
             self.why_not_whole = str(reason)
             return None
-        if found is None:
+        if isinstance(found, str):
+            self.why_not_whole = found
             return None
         self.why_not_whole = found.doubt
         for piece in found.pieces:
@@ -254,8 +255,8 @@ class _Drawn:
         )
 
 
-def _pieces(start: FrictionProblem, end: FrictionProblem, search: Deadline) -> Pieces | None:
-    """All pieces between two problems, None where there are too many contacts to try.
+def _pieces(start: FrictionProblem, end: FrictionProblem, search: Deadline) -> Pieces | str:
+    """All pieces between two problems, or why none were looked for: too many contacts.
 
     Raises TimeUp where W is not there in time.
     """
@@ -263,9 +264,12 @@ def _pieces(start: FrictionProblem, end: FrictionProblem, search: Deadline) -> P
     from ..solutions.enumerate import CONTACTS
     from ..solutions.interval_search import pieces_between
 
-    if start.dimension == 2:
-        return pieces_between(start, end, search) if start.contacts <= CONTACTS else None
-    return pieces_in_space(start, end, search) if start.contacts <= LARGEST else None
+    plane = start.dimension == 2
+    most = CONTACTS if plane else LARGEST
+    if start.contacts > most:
+        return (f"{start.contacts} contacts: the search of an interval takes up to {most} in "
+                f"{start.dimension}D")  # fmt: skip
+    return (pieces_between if plane else pieces_in_space)(start, end, search)
 
 
 def _found_again(

@@ -284,9 +284,9 @@ def _merged(
         else:
             group.append(item)
     degrees = _disjoint(piece, groups)
-    first = [group[0].r.reshape(-1, 2) for group in groups]
+    largest = piece.scaled.largest(*(group[0].r.reshape(-1, 2) for group in groups))
     for group, known in zip(groups, degrees, strict=True):
-        yield _entry(piece, group, known, first), known.value
+        yield _entry(piece, group, known, largest), known.value
 
 
 def _disjoint(piece: PlaneProblem, groups: list[list[PieceAnswer]]) -> list[Degree]:
@@ -336,14 +336,14 @@ def _belongs(piece: PlaneProblem, item: PieceAnswer, group: list[PieceAnswer]) -
 
 
 def _entry(
-    piece: PlaneProblem, group: list[PieceAnswer], known: Degree, listed: list[Array]
+    piece: PlaneProblem, group: list[PieceAnswer], known: Degree, largest: float
 ) -> PieceSolution:
-    """What a group of answers stands for, of all that are listed, (nc, 2) each."""
+    """What a group of answers stands for; largest: reaction of all that are listed."""
     first, value = group[0], known.value or 0
     least = max(abs(value), sum(a.exists for a in group), 2 if first.freedom else 0)
     apart = np.max([np.abs(a.r - first.r) + a.off_r
                     for a in group if not a.freedom or a is first], axis=0)  # fmt: skip
-    distance = piece.scaled.relative(apart.reshape(-1, 2), *listed)
+    distance = piece.scaled.relative(apart.reshape(-1, 2), largest=largest)
     problem, to_r = piece.scaled.problem, piece.scaled.to_r
     reaction = first.r.reshape(-1, 2) * to_r
     velocity = np.array(problem.velocity(reaction)[0])

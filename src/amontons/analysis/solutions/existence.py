@@ -31,7 +31,7 @@ Array = NDArray[np.float64]
 WORDS = 8  # patterns of one solution that are tried
 SAFE = 0.1  # of beta K eta
 ROUNDING = 1e-14  # of equations, scaled
-WORK = 10.0  # operations of a proof per cube of the reactions
+WORK = (1e7, 10.0)  # operations of a proof, and per cube of the reactions
 LITTLE = 5e8  # operations that are always done: some ten milliseconds
 
 
@@ -63,7 +63,7 @@ def takes_too_long(local: Scaled, count: int, deadline: Deadline) -> bool:
 
 
 def _work(local: Scaled, count: int) -> float:
-    return WORK * count * float(local.q.size) ** 3
+    return count * (WORK[0] + WORK[1] * float(local.q.size) ** 3)
 
 
 def _on_segment(scaled: Scaled, r: Array, other: Array) -> bool:

@@ -168,7 +168,7 @@ class Finder:
             if deadline.passed:
                 break
             some = states[k : k + most]
-            deadline.spend(len(some) * solve_work(self.scaled))
+            deadline.spend(solve_work(self.scaled, len(some)))
             out.append(on_piece(self.scaled, some, direction[k : k + most]))
         return np.concatenate(out)
 

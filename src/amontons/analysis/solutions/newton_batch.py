@@ -26,6 +26,7 @@ Array = NDArray[np.float64]
 STEPS = 40  # Newton steps from a start
 CONVERGED = 1e-12  # |F| relative to 1 + |r|, scaled
 SYSTEM = 2e5  # operations that a linear system counts for, however small
+STACK = 1.5e6  # the same of a stack of systems that are solved at once
 LONGEST = 1e8  # scaled reactions that count as run away
 WIDE = 4e6  # entries of a stack of matrices
 
@@ -35,10 +36,10 @@ def width(scaled: Scaled) -> int:
     return max(1, int(WIDE / max(scaled.W.size, 1)))
 
 
-def solve_work(scaled: Scaled) -> float:
-    """Operations of a linear system."""
+def solve_work(scaled: Scaled, count: int) -> float:
+    """Operations of a stack of so many linear systems."""
     n = float(scaled.W.shape[0])
-    return SYSTEM + n**3
+    return STACK + count * (SYSTEM + n**3)
 
 
 def _solve(scaled: Scaled, A: Array, B: Array, right: Array) -> Array:
@@ -168,7 +169,7 @@ def _newton(
         if not going.any() or deadline.passed:
             break
         r, rho = r[going], rho[going]
-        deadline.spend(len(r) * solve_work(scaled))
+        deadline.spend(solve_work(scaled, len(r)))
         dr = _solve(scaled, A[going], B[going], -F[going])
         if known is not None and len(known):
             dr = dr * deflation(r, dr, known)[:, None, None]

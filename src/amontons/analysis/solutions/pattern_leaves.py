@@ -14,7 +14,7 @@ Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]
 Cut = tuple[States, Array]  # pattern and multipliers
 NODES = 2000  # patterns between two looks at the clock, up to 20 contacts
-NODE = 10.0  # operations of a pattern per square of the reactions
+NODE = 60.0  # operations of a pattern per square of the reactions
 
 
 def leaves_of(

@@ -33,7 +33,9 @@ class RegionTree(ABC):
     """
 
     unresolved = False  # is it that solutions can not be told apart?
-    LOOK = 50.0  # operations of looking at a region per cube of the reactions, at least
+    # operations of looking at a region, besides what its multipliers and starts count
+    # themselves: always, of every contact, and per cube of the reactions
+    LOOK = (1.5e7, 1.5e6, 50.0)
 
     def __init__(self, scaled: Scaled, deadline: Deadline) -> None:
         self.scaled, self.deadline = scaled, deadline
@@ -68,7 +70,8 @@ class RegionTree(ABC):
 
     @property
     def _work(self) -> float:
-        return self.LOOK * float(self.scaled.q.size) ** 3
+        fixed, each, cube = self.LOOK
+        return fixed + each * len(self.scaled.mu) + cube * float(self.scaled.q.size) ** 3
 
     def step(self) -> None:
         """Close or divide the region that is next."""

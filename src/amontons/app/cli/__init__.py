@@ -300,6 +300,7 @@ Examples:
   amontons follow example:vee                     two folds, three solutions between them
   amontons follow example:vee --all --mu 2
   amontons follow example:hild --parameter friction --from 0.1 --to 5 --all
+  amontons follow example:hild --from 0.5 --all --certificate c.h5     then amontons check c.h5
   amontons follow example:vee --set continuation.switch=tangent --set continuation.step=1e-3
 
 \b
@@ -329,6 +330,7 @@ Exit codes: 0 every branch has come to its end, 1 one was given up, 2 bad input.
 @click.option("--json", "json_copy", metavar="FILE",
               help="A copy of follow.json; - prints it and nothing else.")  # fmt: skip
 @flags.axes
+@flags.certificate
 @click.option("--quiet", is_flag=True, help="No summary.")
 @flags.of_decks
 def follow(**options: object) -> int:

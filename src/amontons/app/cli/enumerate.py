@@ -67,11 +67,10 @@ def run(
         draw(opened, problem, [s.r for s in found.solutions], named, picture)
     if place is not None:
         _write(found, opened, problem, mu, place, report=report)
-    if certificate is not None and not deliver_certificate(
+    written = certificate is None or deliver_certificate(
         problem, found, certificate, json_copy == "-"
-    ):
-        return INCOMPLETE
-    if found.complete:
+    )
+    if written and found.complete:
         return 0
     return INCOMPLETE if stop.received is None else stop.code
 

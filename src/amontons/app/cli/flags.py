@@ -87,6 +87,10 @@ def of_decks(command: Command) -> Command:
     ) -> Any:
         given = [f"deck.allow={json.dumps(allow)}"] if allow else []
         given += ["deck.hard=true"] if hard else []
+        source = str(options.get("source", options.get("case")))
+        if given and not source.lower().endswith((".inp", ".inp.gz")):
+            flag = "--allow" if allow else "--hard"
+            raise click.UsageError(f"{flag}: it is for decks (.inp), {source} is none")
         return command(overrides=(*overrides, *given), **options)
 
     allowed = click.option("--allow", multiple=True, metavar="KEYWORD",

@@ -8,6 +8,7 @@ from typing import Any
 
 import click
 
+from ...analysis.paths.diagram import Diagram
 from ...analysis.paths.path import Branch, Event, EventKind, Stop
 from ...analysis.paths.quantities import csv_of
 from ...core.errors import InvalidInput
@@ -23,6 +24,7 @@ from .terminal import (
     show_table,
     write_report,
 )
+from .uniqueness import deliver_certificate
 
 SCHEMA = "amontons/follow/1"
 UNFINISHED = 1  # exit code
@@ -37,9 +39,13 @@ def run(
     mu: float | None, every: bool, max_points: int, time_limit: float | None,
     folder: str | None, json_copy: str | None, quiet: bool, figures: str = "png",
     x: str | None = None, y: str | None = None, report: bool = False,
+    certificate: str | None = None,
 ) -> int:  # fmt: skip
     """Follow, write, show; the exit code."""
     check_writable(json_copy, "--json")
+    check_writable(certificate, "--certificate")
+    if certificate is not None and not every:
+        raise InvalidInput("--certificate: expected --all with it, which is what is proved")
     opened = open_source(source, overrides)
     if not low < high:
         raise InvalidInput(f"--from, --to: expected a smaller and a larger number, got {low:g} "
@@ -52,6 +58,7 @@ def run(
     undecided: Sequence[tuple[float, float]] = ()
     limits: dict[str, Any] = {"max_points": max_points, "time_limit": time_limit,
                               "options": opened.settings.continuation()}  # fmt: skip
+    found: Diagram | None = None
     if every:
         found = questions.diagram(target, name, (low, high), **limits)
         branches, complete, reason = list(found), found.complete, found.reason
@@ -79,8 +86,19 @@ def run(
         deliver_json(text, json_copy)
     if json_copy != "-" and not quiet:
         _show(opened.title, parameter, branches, reason, place)
+    if certificate is not None and not _proved(found, low, high, certificate, json_copy == "-"):
+        return UNFINISHED
     ended = all(stop in FINISHED for branch in branches for stop in branch.stops)
     return 0 if ended and complete is not False else UNFINISHED
+
+
+def _proved(found: Diagram | None, low: float, high: float, path: str, err: bool) -> bool:
+    """Write what proves a diagram and say so, err: on stderr; False where nothing does."""
+    if found is None or not len(found):
+        click.echo("No certificate was written: no solution was found", err=True)
+        return False
+    of: Any = found.branches[0].problem
+    return deliver_certificate(of.at(low), found, path, err, end=of.at(high))
 
 
 def record(

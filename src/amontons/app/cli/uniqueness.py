@@ -7,6 +7,7 @@ from collections.abc import Sequence
 import click
 
 from ...analysis.certificates.verdict import Uniqueness, Verdict
+from ...analysis.paths.diagram import Diagram
 from ...analysis.solutions.enumerate import Solutions
 from ...core.errors import InvalidInput
 from ...io.certificates import check_certificate, write_certificate
@@ -39,22 +40,25 @@ def run(
         say_when(opened.target)
     if json_copy is not None:
         deliver_json(to_json(verdict_record(found)), json_copy)
-    if certificate is not None and not deliver_certificate(
+    written = certificate is None or deliver_certificate(
         target, found, certificate, json_copy == "-"
-    ):
-        return UNSETTLED
-    if found.verdict is not Verdict.UNDECIDED:
+    )
+    if written and found.verdict is not Verdict.UNDECIDED:
         return 0
     return UNSETTLED if stop.received is None else stop.code
 
 
 def deliver_certificate(
-    target: Model | FrictionProblem, found: Uniqueness | Solutions, path: str, err: bool
-) -> bool:
-    """Write what proves an answer and say so, err: on stderr; False where nothing does."""
+    target: Model | FrictionProblem, found: Uniqueness | Solutions | Diagram, path: str,
+    err: bool, *, end: FrictionProblem | None = None,
+) -> bool:  # fmt: skip
+    """Write what proves an answer and say so, err: on stderr; False where nothing does.
+
+    end: the problem at the other end of a diagram.
+    """
     problem = target if isinstance(target, FrictionProblem) else target.assemble()
     try:
-        claim = write_certificate(problem, found, path)
+        claim = write_certificate(problem, found, path, end=end)
     except InvalidInput as reason:  # the answer stands
         click.echo(f"No certificate was written: {reason}", err=True)
         return False

@@ -102,7 +102,7 @@ def _load(path: Path) -> dict[str, Any]:
                 raise FileFormatError(
                     f"{path}: expected a case file of at most {LARGEST_FILE} bytes, got {size}"
                 )
-            return tomllib.load(file)
+            return tomllib.loads(file.read().decode("utf-8-sig"))  # editors put a mark first
     except FileNotFoundError:
         raise FileFormatError(f"{path}: no such file{near_file(path)}") from None
     except IsADirectoryError:

@@ -85,7 +85,7 @@ def vector(table: Table, key: str, dim: int, *, free: bool = False) -> list:
             write = f"; write [{values}] without quotes"
         raise table.error(key, f"expected a list of {dim} {words}, got {shown(values)}{write}")
     return [
-        None if free and value == "free" else _entry(table, f"{key}[{k}]", value, dim)
+        None if free and value == "free" else _entry(table, f"{key}[{k}]", value, dim, free)
         for k, value in enumerate(values)
     ]
 
@@ -95,7 +95,9 @@ def scalar(table: Table, key: str) -> float | Expression:
     return _entry(table, key, table.need(key, "a number or an expression"), 3)
 
 
-def _entry(table: Table, key: str, value: Any, dim: int) -> float | Expression:
+def _entry(
+    table: Table, key: str, value: Any, dim: int, free: bool = False
+) -> float | Expression:
     """A finite number, or an expression; one without variables is a number at once."""
     if not isinstance(value, str):
         return table.as_number(key, value)
@@ -105,7 +107,9 @@ def _entry(table: Table, key: str, value: Any, dim: int) -> float | Expression:
             raise InvalidInput(f"expression {value!r}: 'z' does not exist in 2D")
         return expression if expression.names else float(expression(np.zeros(3)))
     except AmontonsError as reason:
-        hint = '; did you mean "free"?' if value.strip().lower() in FREE else number_hint(value)
+        hint = number_hint(value)
+        if value.strip().lower() in FREE:
+            hint = '; did you mean "free"?' if free else ""
         raise table.error(key, f"{reason}{hint}") from None
 
 

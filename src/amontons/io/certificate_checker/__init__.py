@@ -2,7 +2,7 @@
 
 What is claimed and why it follows is in docs/certificates.md.  `numbers` holds what the proofs
 share, `contacts` those by a few numbers of every contact, `patterns` and `lists` those by all
-patterns of statuses, in 2D; none of these three needs another one.
+patterns of statuses, in 2D, `curves` with `boxes` and `tubes` all solutions in 3D.
 """
 
 import hashlib
@@ -11,6 +11,7 @@ import h5py
 import numpy as np
 
 from .contacts import about, every_load
+from .curves import curves
 from .lists import lines
 from .numbers import Refused, need
 from .patterns import tree
@@ -32,7 +33,7 @@ def proves(claim, data):
         need(far <= data["distance"], f"solutions are only within {far:.1e} of r0")
         return f"{nc} contacts: every solution of this load is within {far:.1e} of r0."
     need(claim in ("all solutions", "all branches"), f"unknown claim {claim!r}")
-    return f"{nc} contacts: {lines(**data)}."
+    return f"{nc} contacts: {(curves if 'tree' in data else lines)(**data)}."
 
 
 def check(path):

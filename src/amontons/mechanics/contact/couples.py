@@ -27,7 +27,6 @@ B and w are those of the meeting.  R_r v is the product of the axis r with v; 2D
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from typing import TYPE_CHECKING
@@ -36,7 +35,8 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import sparse
 
-from ...linear.sums import Blocks, sum_of_blocks, sum_of_products
+from ...linear.sums import Blocks, Product, rows_of_blocks, sum_of_blocks, sum_of_products
+from .couple_loops import arms_inplace, forces_inplace, slopes_inplace
 
 if TYPE_CHECKING:
     from .current_mortar import MortarMeeting
@@ -86,63 +86,39 @@ class Couples:
         """q, (k, b)."""
         return self.at.pair.master.nodes[self.at.shared.master]
 
-    def _summed(self, parts: Array) -> Array:
-        """Sums over the pairs of facets, (nc, ...), of parts (k, a, ...)."""
-        kept = self._rows >= 0
-        out = np.zeros((len(self.at.slaves), *parts.shape[2:]))
-        np.add.at(out, self._rows[kept], parts[kept])
-        return out
-
-    def _of(self, values: Array) -> Array:
-        """Values (nc, ...) at every pair and corner, (k, a, ...), zero for none."""
-        kept = (self._rows >= 0).reshape(self._rows.shape + (1,) * (values.ndim - 1))
-        return np.where(kept, values[self._rows], 0.0)
-
     @cached_property
-    def _arms(self) -> Array:
-        """d_pq, (k, a, b, d)."""
-        there = self.x[self._nodes]
-        means = self._summed(self._weights @ there) * self.at.by_weight[:, None]
-        return there[:, None] - self._of(means)[:, :, None]
-
-    @cached_property
-    def _turned(self) -> Array:
-        """R_r d_pq, (k, a, b, r, d)."""
-        return np.einsum("rcd,kabd->kabrc", self._axes, self._arms)
-
-    @cached_property
-    def _inverse(self) -> Array:
-        """J^-1, (nc, r, r)."""
-        own = self._turned
-        J = self._summed(np.einsum("kab,kabrc,kabsc->kars", self._weights, own, own))
+    def _arms_and_inverse(self) -> tuple[Array, Array]:
+        """d_pq, (k, a, b, d), and J^-1, (nc, r, r)."""
+        w, axes = self._weights, self._axes
+        (nc, r), d = (len(self.at.slaves), len(axes)), self.x.shape[1]
+        arms, J = np.empty((*w.shape, d)), np.zeros((nc, r, r))
+        arms_inplace(self.x, self._nodes, self._rows, w, self.at.by_weight, axes, arms, J)
         size = np.trace(J, axis1=1, axis2=2)
         least = np.where(size > 0, FLAT * size, 1.0)
-        regular = J + least[:, None, None] * np.eye(len(self._axes))
-        return np.asarray(np.linalg.inv(regular), dtype=np.float64)
+        regular = J + least[:, None, None] * np.eye(r)
+        return arms, np.asarray(np.linalg.inv(regular), dtype=np.float64)
 
     @cached_property
     def _levers(self) -> Array:
         """J^-1 R_r G, (nc, r, d): -omega per force."""
         apart = (self.at.references @ self.x) * self.at.met[:, None]
         turned: Array = np.einsum("rcd,pd->prc", self._axes, apart)
-        return self._inverse @ turned
+        return self._arms_and_inverse[1] @ turned
 
     def _dofs(self) -> Index:
         """(k, b d)."""
         d = self.x.shape[1]
         return (self._nodes[:, :, None] * d + np.arange(d)).reshape(len(self._nodes), -1)
 
-    def _numbers(self, m: int, first: int = 0) -> Index:
-        """Rows of m values of every p from `first` on, (k, a m), -1 for none."""
-        at = first + self._rows[:, :, None] * m + np.arange(m)
-        at = np.where((self._rows >= 0)[:, :, None], at, -1)
+    def _numbers(self, m: int) -> Index:
+        """Rows of m values of every p, (k, a m), -1 for none."""
+        at = np.where((self._rows >= 0)[:, :, None], self._rows[:, :, None] * m + np.arange(m),
+                      -1)  # fmt: skip
         return at.reshape(len(at), at.shape[1] * m)
 
-    def _onto_nodes(self, values: Array, first: int = 0) -> Blocks:
-        """Entries (k, a, b, m, d) of m values of p at the nodes q, columns from `first` on."""
-        k, a, b, m, d = values.shape
-        moved = values.transpose(0, 2, 4, 1, 3).reshape(k, b * d, a * m)
-        return moved, self._dofs(), np.maximum(self._numbers(m, first), 0)
+    def _onto_nodes(self, values: Array, m: int) -> Blocks:
+        """Entries (k, b d, a m) of m values of p at the nodes q."""
+        return values, self._dofs(), np.maximum(self._numbers(m), 0)
 
     @cached_property
     def matrix(self) -> sparse.csr_array:
@@ -151,74 +127,37 @@ class Couples:
         shape = self.x.size, len(self.at.slaves) * d
         if not self.at.met.any():
             return sparse.csr_array(shape)
-        by_force = self._weights[..., None, None] * np.einsum(
-            "kabrc,kare->kabec", self._turned, -self._of(self._levers)
-        )
-        return sum_of_blocks([self._onto_nodes(by_force)], shape)
+        w, arms = self._weights, self._arms_and_inverse[0]
+        k, a, b = w.shape
+        by_force = np.zeros((k, b * d, a * d))
+        forces_inplace(w, self._rows, arms, self._levers, self._axes, by_force)
+        return sum_of_blocks([self._onto_nodes(by_force, d)], shape)
 
     def slopes(self, force: Array) -> sparse.csr_array:
         """Derivative of `matrix` times held forces (nc, d) by x, (nodes d, nodes d).
 
         Of couples where the meeting is.
         """
+        n = self.x.size
+        return sum_of_products(self.products(force), (n, n))
+
+    def products(self, force: Array) -> list[Product]:
+        """Those that add up to `slopes`; none where nobody meets."""
         (nc, d), n, w = force.shape, self.x.size, self._weights
         if not self.at.met.any():
-            return sparse.csr_array((n, n))
-        omega = -np.einsum("prd,pd->pr", self._levers, force)
-        spin = self._of(np.einsum("pr,rcd->pcd", omega, self._axes))  # v: omega x v
-        pushed = np.einsum("kacd,kabd->kabc", spin, self._arms)
-        (k, _, b), there = w.shape, self._dofs()
-        by_w, dofs = self._by_weights
-        local = np.einsum("kabc,kabw->kbcw", pushed, by_w).reshape(k, b * d, dofs.shape[1])
-        turning = np.einsum("kab,kacd->kbcd", w, spin).reshape(k * b, d, d)
-        nodes = there.reshape(k * b, d)
-        held = sum_of_blocks([(local, there, dofs), (turning, nodes, nodes)], (n, n))
-        apart = -self._inverse @ np.einsum("pc,scd->psd", force, self._axes)
-        changes = [*self._of_means(), *self._of_omega(spin, pushed, nc * d),
-                   *_below(self.at.slopes.by_distances(apart), nc * d)]  # fmt: skip
-        by_means = -w[..., None, None] * spin.swapaxes(2, 3)[:, :, None]
-        by_omega = w[..., None, None] * self._turned
-        onto = [self._onto_nodes(by_means), self._onto_nodes(by_omega, nc * d)]
-        count = nc * (d + len(self._axes))
-        products = sum_of_blocks(onto, (n, count)), sum_of_blocks(changes, (count, n))
-        return sum_of_products([(None, held), products], (n, n))
-
-    @property
-    def _by_weights(self) -> tuple[Array, Index]:
-        """Derivatives of parts of w (k, a, b, w) by dofs (k, w)."""
+            return []
+        (k, a, b), r = w.shape, len(self._axes)
+        arms, inverse = self._arms_and_inverse
+        omega = -(self._levers @ force[:, :, None])[:, :, 0]
         _, cross, dofs = self.at.slopes.integrals
-        return cross[:, :, : self._weights.shape[2]], dofs
-
-    def _of_means(self) -> list[Blocks]:
-        """Derivatives of x_p, rows (nc d,)."""
-        (k, a, b), d, w = self._weights.shape, self.x.shape[1], self._weights
-        by_w, dofs = self._by_weights
-        share, rows = self._of(self.at.by_weight), self._numbers(d)
-        through = np.einsum("kabc,kabw,ka->kacw", self._arms, by_w, share)
-        direct = np.einsum("kab,ka,cd->kacbd", w, share, np.eye(d))
-        return [(through.reshape(k, a * d, dofs.shape[1]), rows, dofs),
-                (direct.reshape(k, a * d, b * d), rows, self._dofs())]  # fmt: skip
-
-    def _of_omega(self, spin: Array, pushed: Array, first: int) -> list[Blocks]:
-        """Derivatives of omega with G held, rows (nc r,) from `first` on.
-
-        spin (k, a, d, d): v to omega x v; pushed (k, a, b, d): that of the arms.
-        """
-        (k, a, b), d, w = self._weights.shape, self.x.shape[1], self._weights
-        by_w, dofs = self._by_weights
-        r, inverse = len(self._axes), self._of(self._inverse)
-        rows = self._numbers(r, first)
-        through = np.einsum("kabsc,kabc,kabw->kasw", self._turned, pushed, by_w)
-        direct = np.einsum("scd,kabc->kabsd", self._axes, pushed)
-        direct = direct + np.einsum("kabsc,kacd->kabsd", self._turned, spin)
-        direct = np.einsum("kab,kabsd->kasbd", w, direct).reshape(k, a, r, b * d)
-        return [((-inverse @ through).reshape(k, a * r, dofs.shape[1]), rows, dofs),
-                ((-inverse @ direct).reshape(k, a * r, b * d), rows, self._dofs())]  # fmt: skip
-
-
-def _below(entries: Sequence[Blocks], first: int) -> list[Blocks]:
-    """Entries with their rows moved down by `first`."""
-    return [
-        (values, np.where(rows < 0, -1, rows + first), columns)
-        for values, rows, columns in entries
-    ]
+        by_w, m = np.ascontiguousarray(cross[:, :, :b]), d + r
+        held, changes = np.zeros((k, b * d, by_w.shape[3])), np.zeros((k, a * m, by_w.shape[3]))
+        onto = np.zeros((k, b * d, a * m))
+        slopes_inplace(w, by_w, self._rows, arms, self._axes, omega, self.at.by_weight, inverse,
+                       held, changes, onto)  # fmt: skip
+        apart = np.zeros((nc, m, d))  # of omega by G
+        apart[:, d:] = -inverse @ np.einsum("pc,scd->psd", force, self._axes)
+        through = [(changes, self._numbers(m), dofs), *self.at.slopes.by_distances(apart)]
+        left = rows_of_blocks([self._onto_nodes(onto, m)], (n, nc * m))
+        right = rows_of_blocks(through, (nc * m, n))
+        return [(None, rows_of_blocks([(held, self._dofs(), dofs)], (n, n))), (left, right)]

@@ -13,10 +13,11 @@ G the distance vector, g the gap, and s the motion since the last step, whose B 
 what slides is the change of B, not of x.  Rotations of everything leave B as it is: s = 0.
 A force lambda_p acts on p, and -B_pj lambda_p on the other nodes j: together no force, and a
 moment G_p x lambda_p, none where the sides touch all along, which `couples` take away.
-A node that met nobody at the end of the last step has as s_p its motion against the master node
-that was closest then.  One that was open then, by g' > 0, met the point over there along its
-normal n', but both sides turn towards each other until they touch: they come closer without a
-slip along the mean of n' and the master's normal n_M, towards the point d beside that one,
+A node that met nobody at the end of the last step has the motion of `newcomers`, one that faded
+then some of both; one that meets nobody now has none.  One that was open then, by g' > 0, met
+the point over there along its normal n', but both sides turn towards each other until they
+touch: they come closer without a slip along the mean of n' and the master's normal n_M, towards
+the point d beside that one,
 
     d_p = g' (n' - m (n' . n_M) / (m . n_M)) = sum_j A'_pj x'_j,    m = n' + n_M,
     s_p = sum_j (B' - (1 - g_p / g') A')_pj x_j - G_p,                                    (3')
@@ -63,6 +64,7 @@ from .current_slopes import MortarSlopes
 from .facing import Skin
 from .fading import Fading
 from .folds import Fold
+from .newcomers import Newcomers
 from .shared import Shared
 
 Array = NDArray[np.float64]
@@ -232,8 +234,8 @@ class MortarMeeting:
     @cached_property
     def bulges(self) -> sparse.csr_array:
         """Bulges of middles of both sides by positions, (nodes, nodes)."""
-        n = len(self.x)
-        return sparse.csr_array(self.pair.slave.bulges(n) + self.pair.master.bulges(n))
+        both = Skin.joined([self.pair.slave, self.pair.master])  # which may share middles
+        return both.bulges(len(self.x))
 
     @cached_property
     def passed(self) -> Array:
@@ -331,12 +333,23 @@ class MortarMeeting:
         return np.where(self.met, along, np.linalg.norm(self.distances, axis=1))
 
     def motion(self, earlier: MortarMeeting) -> Array:
-        """s of (3), (nc, d), since `earlier`, at the end of the last step."""
-        both = (self.met & earlier.met)[:, None]
-        out = earlier.references @ self.x - np.where(both, self.distances, earlier.distances)
+        """s of (3), (nc, d), since `earlier`, at the end of the last step; 0 of the lone."""
+        known = (self.met * earlier.remembered)[:, None]
+        out = earlier.averages @ self.x - self.distances
         if earlier.approach.nnz:
             out -= self.closed_by(earlier)[:, None] * (earlier.approach @ self.x)
-        return out
+        out = np.where(known > 0, known * out, 0.0)
+        newcomers = self.newcomers(earlier)
+        return out if newcomers is None else out + newcomers.motion
+
+    @cached_property
+    def remembered(self) -> Array:
+        """Part (nc,) of the motion since here that averages tell: w of `fading`, 0 of none."""
+        return np.where(self.met, 1.0 if self.fading is None else self.fading.weights, 0.0)
+
+    def newcomers(self, earlier: MortarMeeting) -> Newcomers | None:
+        """Nodes that meet now, and hardly did at the end of the last step; None for none."""
+        return Newcomers.between(self, earlier)
 
     @cached_property
     def fading(self) -> Fading | None:

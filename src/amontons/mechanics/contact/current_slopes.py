@@ -21,8 +21,18 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import sparse
 
-from ...linear.sums import Blocks, by_components, sum_of_blocks, sum_of_products
+from ...linear.sums import (
+    Blocks,
+    Product,
+    Rows,
+    by_components,
+    rows_of_blocks,
+    rows_of_products,
+    sum_of_blocks,
+    sum_of_products,
+)
 from .facet_integrals import FacetPairs
+from .facing import dofs_of
 
 if TYPE_CHECKING:
     from .current_mortar import MortarMeeting
@@ -65,18 +75,19 @@ class MortarSlopes:
 
         All factors (nc, m, d); that of G of nodes that meet.
         """
-        both = (self.at.met & earlier.met)[:, None, None]
-        by_distance = by_distance - by_motion * both
-        entries = []
+        newcomers = self.at.newcomers(earlier)
+        entries = [] if newcomers is None else newcomers.entries(by_motion)
+        by_motion = by_motion * (self.at.met * earlier.remembered)[:, None, None]
+        by_distance = by_distance - by_motion
         if earlier.approach.nnz:
             closed = self.at.closed_by(earlier)[:, None, None]
             entries.append(averaged(earlier.approach, -closed * by_motion))
             beside = np.asarray(earlier.approach @ self.at.x) * earlier.by_opening[:, None]
-            by_gap = (by_motion @ beside[:, :, None]) * both
+            by_gap = by_motion @ beside[:, :, None]
             by_normal = by_normal + by_gap * self.at.distances[:, None]
             by_distance = by_distance + by_gap * self.at.normals[:, None]
         entries += [self._normals.times(by_normal), *self.by_distances(by_distance),
-                    averaged(earlier.references, by_motion)]  # fmt: skip
+                    averaged(earlier.averages, by_motion)]  # fmt: skip
         nc, m = by_normal.shape[:2]
         return sum_of_blocks(entries, (nc * m, self.at.x.size))
 
@@ -131,7 +142,7 @@ class MortarSlopes:
         row = np.where(heeded, own[skin.nodes], -1)
         values = np.where((row >= 0)[:, :, None, None], project[row], 0.0)
         values = values @ (share / skin.corners[:, None, None, None])  # (f, a, d, a d)
-        return SlotSlopes(values, row, _dofs(skin.nodes, d))
+        return SlotSlopes(values, row, dofs_of(skin.nodes, d))
 
     @cached_property
     def integrals(self) -> tuple[Array, Array, Index]:
@@ -144,16 +155,16 @@ class MortarSlopes:
         own, cross = FacetPairs.of(
             pair.slave, parts.slave, pair.master, parts.master, self.at.x
         ).slopes()
-        return own, cross, _dofs(np.concatenate([slave, master], axis=1), self.at.x.shape[1])
+        return own, cross, dofs_of(np.concatenate([slave, master], axis=1), self.at.x.shape[1])
 
     @cached_property
-    def weights(self) -> sparse.csr_array:
+    def weights(self) -> Rows:
         """dD/dx, (nc, nodes d)."""
         own, _, dofs = self.integrals
         mass = own[:, :, : self.at.pair.slave.nodes.shape[1]]
         rows = self.at.rows[self.at.shared.of]
         shape = len(self.at.slaves), self.at.x.size
-        return sum_of_blocks([(mass.sum(axis=2), rows, dofs)], shape)
+        return rows_of_blocks([(mass.sum(axis=2), rows, dofs)], shape)
 
     @cached_property
     def _distances(self) -> SlotSlopes:
@@ -169,25 +180,38 @@ class MortarSlopes:
         apart = y - np.where(kept[:, :, None], self.at.distances[row], 0.0)
         apart = apart * scale[:, :, None]
         a, scaled = psi.shape[1], psi * scale[:, :, None]
-        # (f, p, c, r, t): by own_rt, where the first a of t are mass_rt
+        # by own_rt, where the first a of t are mass_rt, of all r: psi_pr times (t, c)
         beside = at.copy()
         beside[:, :a] -= y
-        by_own = scaled[:, :, None, :, None] * beside.swapaxes(1, 2)[:, None, :, None, :]
-        by_own[..., :a] += (apart[:, :, :, None] * np.eye(a)[:, None])[..., None]
-        by_cross = there.swapaxes(1, 2)[:, None, :, None, :]
-        by_cross = -scaled[parts.of][:, :, None, :, None] * by_cross
         own, cross, dofs = self.integrals
-        values = _through(by_own[parts.of], own) + _through(by_cross, cross)
-        return SlotSlopes(values.reshape(-1, a, d, dofs.shape[1]), row[parts.of], dofs)
+        moved = beside.swapaxes(1, 2)[parts.of][:, None] @ own
+        moved -= there.swapaxes(1, 2)[:, None] @ cross  # (k, r, c, w)
+        k, w = dofs.shape
+        values = (scaled[parts.of] @ moved.reshape(k, a, d * w)).reshape(k, a, d, w)
+        values += apart[parts.of][..., None] * own[:, :, :a].sum(axis=2)[:, :, None]
+        return SlotSlopes(values, row[parts.of], dofs)
 
     def pushed(self, force: Array) -> sparse.csr_array:
         """Derivative of all forces by x, (nodes d, nodes d); force (nc, d): lambda, held."""
-        return sparse.csr_array(self.spread(force) + self.at.couples.slopes(force))
+        n = self.at.x.size
+        return sum_of_products(self.products(force), (n, n))
+
+    def products(self, force: Array) -> list[Product]:
+        """Those that add up to `pushed`."""
+        return self._spread(force) + self.at.couples.products(force)
 
     def spread(self, force: Array) -> sparse.csr_array:
         """Derivative of sum_p B_pj lambda_p at all nodes j by x, (nodes d, nodes d).
 
-        force (nc, d): lambda, held.  With z_r = sum_p psi_pr lambda_p / D_p on every facet that
+        force (nc, d): lambda, held.
+        """
+        n = self.at.x.size
+        return sum_of_products(self._spread(force), (n, n))
+
+    def _spread(self, force: Array) -> list[Product]:
+        """The products of `spread`.
+
+        With z_r = sum_p psi_pr lambda_p / D_p on every facet that
         is z own at nodes of the slave and -z cross at those of the master; by (1) its change is
 
             d(z h) = v Q h + z dh,    v_t = lambda_t d(W_t / D_t) - sum_r z_r dmass_rt.    (2)
@@ -208,10 +232,10 @@ class MortarSlopes:
                               (master.middles[parts.master], slice(b, None)))  # fmt: skip
             lifts = by_components(sparse.csr_array(self.at.bulges.T), np.ones(self.at.x.shape))
             n = self.at.x.size
-            out = sum_of_products([(None, out), (lifts, bent)], (n, n))
+            out.append((lifts, rows_of_products(bent, (n, n))))
         return out
 
-    def _changes(self, z: Array, w: Array) -> sparse.csr_array:
+    def _changes(self, z: Array, w: Array) -> Rows:
         """v by x of (2), (f a d, nodes d), for z (f, a, d); w (f, p, d): lambda / D."""
         parts, row = self.at.shared, self.at.rows
         f, a, d = z.shape
@@ -220,22 +244,23 @@ class MortarSlopes:
         mass = own[:, :, :a]
         # (k, t, c, w)
         values = w[parts.of][..., None] * mass.sum(axis=2)[:, :, None]
-        values -= np.einsum("krc,krtw->ktcw", z[parts.of], mass)
+        k, ways = dofs.shape
+        held = z.swapaxes(1, 2)[parts.of] @ mass.reshape(k, a, a * ways)
+        values -= held.reshape(k, d, a, ways).swapaxes(1, 2)
         rows = parts.of[:, None] * a * d + np.arange(a * d)
-        held = values.reshape(len(dofs), a * d, dofs.shape[1]), rows, dofs
+        blocks = values.reshape(k, a * d, ways), rows, dofs
         # D_t in lambda W / D_t
         scale = np.where(row >= 0, self.at.by_weight[row], 0.0) * parts.weights
         by_weight = -(w * scale[:, :, None]).reshape(-1, d, 1)
         rows = np.arange(f * a * d).reshape(-1, d)
         into = np.maximum(row, 0).reshape(-1, 1)
-        by_weights = sum_of_blocks([(by_weight, rows, into)], (f * a * d, nc))
-        rest = sum_of_blocks([held], (f * a * d, n))
-        return sum_of_products([(None, rest), (by_weights, self.weights)], (f * a * d, n))
+        by_weights = rows_of_blocks([(by_weight, rows, into)], (f * a * d, nc))
+        rest = rows_of_blocks([blocks], (f * a * d, n))
+        return rows_of_products([(None, rest), (by_weights, self.weights)], (f * a * d, n))
 
     def _onto(
-        self, z: Array, by_x: sparse.csr_array, mine: tuple[Index, slice],
-        theirs: tuple[Index, slice],
-    ) -> sparse.csr_array:  # fmt: skip
+        self, z: Array, by_x: Rows, mine: tuple[Index, slice], theirs: tuple[Index, slice]
+    ) -> list[Product]:
         """Of z own at nodes of the slave's facets (f, s), and -z cross at the master's (k, b).
 
         by_x: v of (2) by x; with the nodes come their slots in own and cross.
@@ -260,15 +285,8 @@ class MortarSlopes:
             values = values.reshape(len(dofs), s * d, dofs.shape[1])
             local.append((values, at.reshape(len(dofs), s * d), dofs))
         n = self.at.x.size
-        by_z = sum_of_blocks(forms, (n, f * a * d))
-        rest = sum_of_blocks(local, (n, n))
-        return sum_of_products([(by_z, by_x), (None, rest)], (n, n))
-
-
-def _through(factors: Array, slopes: Array) -> Array:
-    """sum_rt factors (k, p, c, r, t) slopes (k, r, t, w), (k, p c, w)."""
-    k, p, c, r, t = factors.shape
-    return factors.reshape(k, p * c, r * t) @ slopes.reshape(k, r * t, slopes.shape[3])
+        by_z = rows_of_blocks(forms, (n, f * a * d))
+        return [(by_z, by_x), (None, rows_of_blocks(local, (n, n)))]
 
 
 def averaged(averages: sparse.csr_array, factors: Array) -> Blocks:
@@ -283,10 +301,6 @@ def averaged(averages: sparse.csr_array, factors: Array) -> Blocks:
 def blocks_of(values: Array) -> sparse.csr_array:
     """Blocks (nc, m, d) on the diagonal of a matrix (nc m, nc d)."""
     nc, m, d = values.shape
-    entries = (values, np.arange(nc), np.arange(nc + 1))
-    return sparse.csr_array(sparse.bsr_array(entries, shape=(nc * m, nc * d)))
-
-
-def _dofs(nodes: Index, d: int) -> Index:
-    """Dofs (k, a d) of nodes (k, a)."""
-    return (nodes[:, :, None] * d + np.arange(d)).reshape(len(nodes), nodes.shape[1] * d)
+    columns = np.broadcast_to(np.arange(nc * d).reshape(nc, 1, d), values.shape)
+    entries = (values.ravel(), columns.ravel(), np.arange(0, nc * m * d + 1, d))
+    return sparse.csr_array(entries, shape=(nc * m, nc * d))

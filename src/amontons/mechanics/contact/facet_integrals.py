@@ -7,9 +7,10 @@ functions of first order of both and the integrals over the part they share, on 
 
 Facets of second order are projected as those on their corners are; behind phi and N stand then
 the functions of their other nodes, which move the surface by the bulges of `facing`.
-The integrals depend on the corners of the two facets alone.  Derivatives between lines are
-those of a complex step: the real parts decide where parts end, imaginary ones of 1e-100 carry
-the derivative through, exact to rounding as nothing is subtracted.
+The integrals depend on the corners of the two facets alone; those of a warped facet that is
+seen all but edge-on fade, see `edge_on`.  Derivatives between lines are those of a complex
+step: the real parts decide where parts end, imaginary ones of 1e-100 carry the derivative
+through, exact to rounding as nothing is subtracted.
 
 [PL] M. Puso, T. Laursen, "A mortar segment-to-segment contact method for large deformation
 solid mechanics", Comput. Methods Appl. Mech. Engrg. 193 (2004) 601-629.
@@ -18,12 +19,14 @@ solid mechanics", Comput. Methods Appl. Mech. Engrg. 193 (2004) 601-629.
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
+from functools import cached_property
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from .edge_on import visible, visible_slopes
 from .facing import Skin
 from .plane_integrals import plane_integrals, plane_slopes, rules
 
@@ -63,6 +66,11 @@ def line_integrals(
         mass += area * own[..., :2, None] * own[..., None, :]
         cross += area * own[..., :2, None] * shape[..., None, :]
     return mass, cross
+
+
+def _over(factors: Array, values: Array) -> Array:
+    """Factors (k,) in the shape of values (k, ...)."""
+    return factors.reshape(-1, *[1] * (values.ndim - 1))
 
 
 def _on_line(at: Values, bent: bool) -> Values:
@@ -105,7 +113,7 @@ class FacetPairs:
         (k, a, d), b = self.slave.shape, self.master.shape[1]
         ways = (a + b) * d
         if d == 3:
-            return self._in_space(plane_slopes, ways)
+            return self._slopes_in_space(ways)
         both = np.concatenate([self.slave, self.master], axis=1).reshape(k, ways)
         moved = both[:, None, :] + 1j * STEP * np.eye(ways)
         moved = moved.reshape(k, ways, a + b, d)
@@ -113,13 +121,46 @@ class FacetPairs:
         mass, cross = (np.moveaxis(part.imag, 1, -1) / STEP for part in found)
         return mass, cross
 
+    @cached_property
+    def _visible(self) -> Array:
+        """w of `edge_on`, (k,), 1 for triangles."""
+        out, quads = np.ones(len(self.facing)), self.facing == 4
+        out[quads] = visible(self.slave[quads], self.master[quads])
+        return out
+
     def _in_space(self, kernel: Callable[..., None], *ways: int) -> tuple[Array, Array]:
+        """What a kernel finds, times w."""
         (k, a, _), b = self.slave.shape, self.master.shape[1]
         e, h = self.widths
-        mass, cross = np.zeros((k, a, a + e, *ways)), np.zeros((k, a, b + h, *ways))
+        found = np.zeros((k, a, a + e, *ways)), np.zeros((k, a, b + h, *ways))
         numbers = np.stack([self.corners, self.facing, self.bent, self.opposite], axis=1)
-        kernel(self.slave, self.master, numbers, *rules(second=e + h > 0), mass, cross)
-        return mass, cross
+        given, w = rules(second=e + h > 0), self._visible
+        if (w == 1).all():
+            kernel(self.slave, self.master, numbers, *given, *found)
+            return found
+        some = np.flatnonzero(w > 0)  # over outlines that cross themselves there is no integral
+        parts = [part[some] for part in found]
+        kernel(self.slave[some], self.master[some], numbers[some], *given, *parts)
+        for out, part in zip(found, parts, strict=True):
+            out[some] = part * _over(w[some], part)
+        return found
+
+    def _slopes_in_space(self, ways: int) -> tuple[Array, Array]:
+        """w times the derivatives of the integrals, and these times that of w."""
+        found = self._in_space(plane_slopes, ways)
+        fades = np.flatnonzero((self._visible > 0) & (self._visible < 1))
+        if not len(fades):
+            return found
+        some = self.part(fades)
+        by = visible_slopes(some.slave, some.master)[:, None, None]
+        for out, part in zip(found, some.integrals(), strict=True):
+            out[fades] += (part / _over(some._visible, part))[..., None] * by
+        return found
+
+    def part(self, chosen: Index) -> FacetPairs:
+        """Some of the pairs."""
+        return FacetPairs(*(getattr(self, one.name)[chosen] for one in fields(self)[:-1]),
+                          self.widths)  # fmt: skip
 
     def _on_lines(self, slave: Values, master: Values) -> tuple[Values, Values]:
         """`line_integrals`; of lines without a middle nothing at it."""

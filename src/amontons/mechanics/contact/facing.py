@@ -137,7 +137,9 @@ class Skin:
         if x.shape[1] == 2:
             edge = p[:, 1] - p[:, 0]
             return np.stack([edge[:, 1], -edge[:, 0]], axis=1)
-        return 0.5 * np.cross(p[:, 2] - p[:, 0], p[:, -1] - p[:, 1])
+        a, b = (p[:, 2] - p[:, 0]).T, 0.5 * (p[:, -1] - p[:, 1]).T
+        return np.stack([a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2],
+                         a[0] * b[1] - a[1] * b[0]], axis=1)  # fmt: skip
 
     def gradients(self, x: Array, chosen: Index) -> Array:
         """Surface gradients of the functions of corners at the centres of facets, (k, a, d).
@@ -174,6 +176,11 @@ class Skin:
         out[:, :, -1] += by_second
         out[:, :, 1] -= by_second
         return out
+
+
+def dofs_of(nodes: Index, d: int) -> Index:
+    """Dofs (k, a d) of nodes (k, a)."""
+    return (nodes[:, :, None] * d + np.arange(d)).reshape(len(nodes), nodes.shape[1] * d)
 
 
 def _wider(table: Index, width: int, last: Index) -> Index:

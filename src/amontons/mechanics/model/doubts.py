@@ -18,6 +18,7 @@ from .locking import volumetric_locking
 from .matching import nodal_on_non_matching
 from .rotation import large_rotation
 from .sliding import sliding_beyond_curvature, sliding_beyond_pairs
+from .unfaced import unfaced_slaves
 
 if TYPE_CHECKING:
     from .model import Model
@@ -31,7 +32,7 @@ CHECKS: tuple[Check, ...] = (
     like_percent,
 )
 OF_THE_START = (sliding_beyond_pairs, sliding_beyond_curvature)  # its pairs, normals
-OF_WHERE_NODES_ARE = (held_facets,)  # where pairs are found there
+OF_WHERE_NODES_ARE = (held_facets, unfaced_slaves)  # where pairs are found there
 OF_MOTIONS = (large_rotation, *OF_THE_START, *OF_WHERE_NODES_ARE)
 
 

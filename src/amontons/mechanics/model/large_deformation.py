@@ -24,7 +24,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field, replace
 from functools import cached_property
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -47,6 +47,7 @@ from .nonlinear_parts import NonlinearParts, nonlinear_parts
 from .obstacle_linearisation import Linearisation, turned_forces
 from .places_of_failure import places_of_failure
 from .pressure_states import PressureStates
+from .tangent_structure import free_modes
 
 if TYPE_CHECKING:
     from .model import Model
@@ -77,6 +78,7 @@ class LargeDeformation(NonlinearProblem):
     drawn: Array | None = None
     play: Array | None = None
     _last: list[Array] = field(default_factory=list, init=False, repr=False)  # of `_local`
+    _kept: list[Array] = field(default_factory=list, init=False, repr=False)  # of `_balanced`
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "load", NodalForces.of(self.load))
@@ -136,23 +138,31 @@ class LargeDeformation(NonlinearProblem):
         motion = meeting.motion(u, self.before.reshape(u.shape), self.earlier)
         return motion + self.drift, meeting
 
-    def _point(
-        self, u: Array, needed: Array, pieces: Pieces | None = None
-    ) -> tuple[ContactPoint, Array]:
-        """The law at displacements u (nodes, d), where the bodies need `needed` (dofs,).
+    def _balanced(self, u: Array, meeting: Meetings) -> Array:
+        """f_int - f, balanced (dofs,), at displacements u (nodes, d); the last one is kept."""
+        if not (self._kept and np.array_equal(self._kept[0], u)):
+            self._kept[:] = u.copy(), balanced(self.parts, meeting, self._needed(u))
+        return self._kept[1].copy()
 
-        And these without what contacts give to other nodes, by the active or given pieces.
+    def _point(
+        self, u: Array, pieces: Pieces | None = None, needed: Array | None = None
+    ) -> tuple[ContactPoint, Array]:
+        """The law at displacements u (nodes, d), and f_int - f, balanced.
+
+        By the active or given pieces; needed (dofs,): f_int - f at given pressures.
         """
         known = *self._meeting(u), self.drawn, self.play
-        return balanced_law(self.parts, needed, known, pieces)
+        if needed is not None:
+            rest = balanced(self.parts, known[1], needed)
+        else:
+            needed, rest = self._needed(u), self._balanced(u, known[1])
+        return balanced_law(self.parts, needed, rest, known, pieces)
 
     def _needed(self, u: Array, pressures: Array | None = None) -> Array:
         """f_int - f (dofs,) at displacements u (nodes, d), or at given pressures, too."""
         return self.parts.forces(u, pressures) - self.load.at(u)
 
-    def _needed_slopes(
-        self, u: Array, pressures: Array | None = None
-    ) -> tuple[Array, Array]:
+    def _needed_slopes(self, u: Array, pressures: Array | None = None) -> tuple[Array, Array]:
         """The same with its derivative in node blocks (m, d, d)."""
         inner, blocks = self.parts.tangent(u, pressures)
         load, slopes = self.load.slopes(u)
@@ -162,8 +172,7 @@ class LargeDeformation(NonlinearProblem):
 
     def contact_point(self, v: Array) -> ContactPoint:
         """The contact law at a state."""
-        u = self.displacement(v)
-        return self._point(u, self._needed(u))[0]
+        return self._point(self.displacement(v))[0]
 
     def residual(
         self, v: Array, pieces: Pieces | None = None, pressures: Array | None = None
@@ -174,7 +183,8 @@ class LargeDeformation(NonlinearProblem):
         is not defined.
         """
         u = self.displacement(v)
-        point, rest = self._point(u, self._needed(u, pressures), pieces)
+        needed = None if pressures is None else self._needed(u, pressures)
+        point, rest = self._point(u, pieces, needed)
         rest[self.parts.at] = point.residual(pieces)
         return rest[self.parts.free]
 
@@ -188,7 +198,7 @@ class LargeDeformation(NonlinearProblem):
         """F and its derivatives at a state; pressures as in `residual`."""
         parts, u = self.parts, self.displacement(v)
         needed, blocks = self._needed_slopes(u, pressures)
-        point, rest = self._point(u, needed, pieces)
+        point, rest = self._point(u, pieces, None if pressures is None else needed)
         if not point.meeting.only_obstacles:
             return PairLinearisation(parts, u, rest, blocks, point, self.earlier, pieces)
         return Linearisation(parts, u, rest, blocks, point, *point.derivatives(pieces))
@@ -210,7 +220,7 @@ class LargeDeformation(NonlinearProblem):
         if not (self._last and np.array_equal(self._last[0], v)):
             u, contact = self.displacement(v), self.parts.contact
             motion, meeting = self._meeting(u)
-            rest = balanced(self.parts, meeting, self._needed(u))
+            rest = self._balanced(u, meeting)
             local = contact.local(rest[self.parts.at], motion, meeting, self.drawn, self.play)
             self._last[:] = v.copy(), *local, rest
         return tuple(part.copy() for part in self._last[1:])  # type: ignore[return-value]
@@ -287,9 +297,7 @@ class LargeDeformation(NonlinearProblem):
         """True where some body keeps small strains: its cells may be inverted."""
         return any(isinstance(body, LinearBody) for body in self.parts.bodies)
 
-    def states(
-        self, v: Array, known: tuple[LargeDeformation, Array] | None = None
-    ) -> PlainStates | PressureStates:
+    def states(self, v: Array, known: Any = None) -> PlainStates | PressureStates:
         """What Newton's method moves: v alone, or with the pressures of hybrid cells."""
         if not any(self.parts.keeps_volume):
             return PlainStates(self, v)
@@ -300,11 +308,9 @@ class LargeDeformation(NonlinearProblem):
         if self.known is None:
             return replace(self, load=share * self.load, prescribed=share * self.prescribed)
         load, prescribed, _ = self.known
-        return replace(
-            self,
-            load=self.load * share + (1 - share) * NodalForces.of(load),
-            prescribed=prescribed + share * (self.prescribed - prescribed),
-        )
+        moved = prescribed + share * (self.prescribed - prescribed)
+        return replace(self, load=self.load * share + (1 - share) * NodalForces.of(load),
+                       prescribed=moved)  # fmt: skip
 
     def predicted(  # type: ignore[override]  # as above
         self, share: float, goal: float, v: Array
@@ -317,15 +323,16 @@ class LargeDeformation(NonlinearProblem):
     def towards(self, share: float, goal: float, v: Array) -> FrictionProblem:
         """The tangent problem at a share and state v, under the load of another share."""
         now, then = self.at_share(share), self.at_share(goal)
-        tangent = now.linearised(v)
+        tangent, displaced = now.linearised(v), now.displacement(v)
         moved = then.prescribed - now.prescribed
-        displaced = now.displacement(v)
         blocks = now._needed_slopes(displaced)[1]
         force = (then.load - now.load).at(displaced) - self.parts.matrix(blocks) @ moved
         meeting, w = self.parts.meet(displaced), np.array(tangent.w)
         across = meeting.relative(moved.reshape(displaced.shape))
         w[:, 0] += (meeting.normals * across).sum(axis=1)
-        return replace(tangent, f=tangent.f + force[self.parts.free], w=w)
+        force, modes = force[self.parts.free], free_modes(self.parts, displaced)
+        return replace(tangent, f=tangent.f + force, w=w, near_nullspace=modes, guess=v,
+                       load_scale=max(tangent.load, float(np.linalg.norm(force))))  # fmt: skip
 
     def remark(self, v: Array) -> str:
         """Which slaves face nothing of their masters, have left them, and what is flat."""
@@ -334,10 +341,10 @@ class LargeDeformation(NonlinearProblem):
     def closed_pieces(self, v: Array) -> list[Pieces]:
         """The active pieces with touching contacts stuck, then with all of them stuck."""
         point = self.contact_point(v)
-        near = TOUCHING * np.ptp(self.parts.X, axis=0).max()
         loose = (point.pieces % 4 == 0) & point.meeting.met
+        size = np.ptp(self.parts.X, axis=0).max()
         return [np.where(loose & (point.meeting.gap <= limit), STICK, point.pieces)
-                for limit in (near, np.inf)]  # fmt: skip
+                for limit in (TOUCHING * size, np.inf)]  # fmt: skip
 
     # ---------------------------------------------------------------- results
     def recover(self, r: Array, v: Array | None = None) -> tuple[Problem, Array, Array]:
@@ -353,8 +360,7 @@ class LargeDeformation(NonlinearProblem):
 
         Between bodies that deform frames and averages stay as they are there.
         """
-        parts = self.parts
-        moved = self.displacement(v)
+        parts, moved = self.parts, self.displacement(v)
         needed, blocks = self._needed_slopes(moved)
         r, u, axes, rest = self._local(v)
         meeting = parts.meet(moved)
@@ -371,10 +377,7 @@ class LargeDeformation(NonlinearProblem):
 
 
 def large_deformation(model: Model) -> LargeDeformation:
-    """The static problem of a model in large deformations, at its load factor.
-
-    Friction speaks of the motion from the undeformed state.
-    """
+    """The static problem of a model at its load factor; motion from the undeformed state."""
     nonlinear_parts(model)  # says what is not supported
     linear = model.discretisation
     load, factor = nodal_forces(model, model.loads), model.load_factor

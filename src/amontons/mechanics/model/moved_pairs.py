@@ -41,7 +41,15 @@ from numpy.typing import NDArray
 from scipy import sparse
 
 from ...linear.condensed import Structure
-from ...linear.sums import among, by_components, in_rows, sum_of_products
+from ...linear.sums import (
+    Product,
+    Rows,
+    among,
+    by_components,
+    in_rows,
+    rows_of_products,
+    sum_of_products,
+)
 from ..contact.carried import TiedMeeting
 from ..contact.current import ContactPoint, Partials, Pieces
 from ..contact.current_mortar import MortarMeeting
@@ -81,14 +89,14 @@ def _carried(parts: NonlinearParts, meeting: Meetings) -> Array:
 
 
 def balanced_law(
-    parts: NonlinearParts, needed: Array,
+    parts: NonlinearParts, needed: Array, rest: Array,
     known: tuple[Array, Meetings, Array | None, Array | None], pieces: Pieces | None = None,
 ) -> tuple[ContactPoint, Array]:  # fmt: skip
     """The law, and `balanced`, with (3) by the active or given pieces.
 
-    known: s, where contacts meet, drawn and play of `CurrentContact.at`.
+    rest: `balanced` without (3); known: s, where contacts meet, drawn and play of
+    `CurrentContact.at`.
     """
-    rest = balanced(parts, known[1], needed)
     point = parts.contact.at(rest[parts.at], *known)
     if point.mixed is None:
         return point, rest
@@ -259,12 +267,15 @@ class PairLinearisation:
         return local
 
     @property
-    def _turned(self) -> Iterator[sparse.csr_array]:
-        """Derivatives of the forces on other nodes by all places, lambda held, (dofs, dofs)."""
+    def _turned(self) -> Iterator[list[Product]]:
+        """Derivatives of the forces on other nodes by all places, lambda held, (dofs, dofs).
+
+        With the other sign: products that add up to them.
+        """
         less, force = kept_back(self.point, self.given), self._force
         for part, _, mine in self._each:
             if isinstance(part, MortarMeeting):
-                yield part.slopes.pushed(force[mine] if less is None else (force - less)[mine])
+                yield part.slopes.products((-force if less is None else less - force)[mine])
         if less is None:
             return
         law, rows = self.point.residual(self.given) * self.parts.contact.free, []
@@ -276,25 +287,27 @@ class PairLinearisation:
                 nothing = np.zeros((*law[mine].shape, law.shape[1]))
                 rows.append(fading.slopes(force[mine], nothing, law[mine]))
         kept = sparse.csr_array(sparse.diags_array(self._faint) @ self._by_place)
-        yield sparse.csr_array(self._others @ (sparse.csr_array(sparse.vstack(rows)) - kept))
+        yield [(self._others, sparse.csr_array(kept - sparse.csr_array(sparse.vstack(rows))))]
 
     @cached_property
-    def _near(self) -> sparse.csr_array:
+    def _near(self) -> Rows:
         """dF/dx without the rows of `blocks` that are `_kept`, (dofs, dofs)."""
         parts, shape = self.parts, (len(self.rest), len(self.rest))
-        stiffness = sparse.csr_array(parts.matrix(self.blocks))
-        own = in_rows(self._by_place, parts.at.ravel(), len(self.rest))
-        taken = [(-self._returned, sparse.csr_array(self._left(stiffness)))]
+        own = needed = parts.gathered(self.blocks)
+        if parts.chained:
+            needed = sparse.csr_array(_unchained(parts, self._returned, own.matrix))
+        taken: list[Product] = [(self._returned, -needed)]
         for turned in self._turned:
-            taken.append((None, -turned))
+            taken += turned
             if parts.chained:
-                taken.append((self._returned, sparse.csr_array(self._left(turned))))
-        change = sum_of_products(taken, shape)  # of what is left of f_int - f
-        kept = sparse.csr_array(
-            (change.data * np.repeat(self._kept, np.diff(change.indptr)), change.indices,
-             change.indptr), shape=shape)  # fmt: skip
-        products = [(None, kept), (self._law, stiffness), (self._law, change), (None, own)]
-        return sum_of_products(products, shape)
+                left = self._left(sum_of_products(turned, shape))
+                taken.append((self._returned, sparse.csr_array(-left)))
+        change = rows_of_products(taken, shape)  # of what is left of f_int - f
+        by_force, by_place = (in_rows(part, parts.at.ravel(), len(self.rest))
+                              for part in (self._by_force, self._by_place))  # fmt: skip
+        products = [(None, change.times(self._kept)), (by_force, own), (self._law, change),
+                    (None, by_place)]  # fmt: skip
+        return rows_of_products(products, shape)
 
     @cached_property
     def matrix(self) -> sparse.csc_array:
@@ -309,7 +322,7 @@ class PairLinearisation:
     ) -> Array:
         """First-order change of F, (n,), with changes of load, prescribed (dofs,) and drift."""
         change = self._kept * (self.parts.matrix(self.blocks) @ prescribed)
-        change += self._near @ prescribed
+        change += self._near.matrix @ prescribed
         out = change[self.parts.free] - self.passed(NodalForces.of(load).at(self.u))
         if drift is not None:
             out += self.with_law(np.einsum("pij,pj->pi", self._chained[0][3], drift))

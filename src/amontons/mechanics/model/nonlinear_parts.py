@@ -17,6 +17,7 @@ from numpy.typing import NDArray
 from scipy import sparse
 
 from ...core.errors import InvertedCells, UnsupportedForm
+from ...linear.sums import Rows, rows_of_products
 from ..contact.current import CurrentContact
 from ..contact.current_mortar import MortarPair
 from ..contact.current_pairs import Meetings, between_bodies
@@ -237,9 +238,10 @@ class NonlinearParts:
     def tangent(self, u: Array, pressures: Array | None = None) -> tuple[Array, Array]:
         """(forces (dofs,), node blocks (m, d, d) of their derivative) at displacements u."""
         both = self._of_each("tangent", u, pressures)
-        return np.concatenate([f.ravel() for f, _ in both]), np.concatenate(
-            [b for _, b in both]
-        )
+        forces = np.concatenate([f.ravel() for f, _ in both])
+        if pressures is None and not any(np.array_equal(known, u) for known, _ in self._known):
+            self._keep(u, forces)
+        return forces, np.concatenate([b for _, b in both])
 
     def energy(self, u: Array) -> float:
         """Stored energy at displacements u (nodes, d)."""
@@ -261,6 +263,38 @@ class NonlinearParts:
     def matrix(self, blocks: Array) -> sparse.bsr_array:
         """Node blocks as a matrix (dofs, dofs)."""
         return _matrix(blocks, self.columns, self.pointers)
+
+    def gathered(self, blocks: Array) -> Rows:
+        """`gathers` times the matrix of node blocks, (nc d, dofs)."""
+        pointers, columns, taken, mixing = self._gathering
+        shape = len(pointers) - 1, self.X.size
+        found = Rows(pointers, columns, blocks.ravel()[taken], shape)
+        return found if mixing is None else rows_of_products(
+            [(mixing, found)], (self.at.size, self.X.size))  # fmt: skip
+
+    @cached_property
+    def _gathering(self) -> tuple[Index, Index, Index, sparse.csr_array | None]:
+        """Rows of the matrix of nodes that `gathers` asks for, and C of these, None for 1.
+
+        Pointers, columns, and places of their entries among those of the node blocks.
+        """
+        d = self.dimension
+        alone = self.gathers.nnz == self.at.size  # no middles: 1 at the slaves
+        nodes = self.at[:, 0] // d if alone else np.unique(self.gathers.indices // d)
+        nodes = nodes.astype(np.int64)
+        sizes = np.diff(self.pointers)[nodes]
+        first = np.repeat(self.pointers[nodes] - np.cumsum(sizes) + sizes, sizes)
+        places = first + np.arange(sizes.sum())  # of their blocks
+        numbers = np.arange(len(self.columns) * d * d, dtype=np.int64).reshape(-1, d, d)
+        ends = np.concatenate([[0], np.cumsum(sizes)])
+        rows = sparse.bsr_array((numbers[places], self.columns[places], ends),
+                                shape=(len(nodes) * d, self.X.size)).tocsr()  # fmt: skip
+        taken = rows.data.astype(np.int64)
+        found = rows.indptr.astype(np.int64), rows.indices.astype(np.int64), taken
+        if alone:
+            return *found, None
+        dofs = (nodes[:, None] * d + np.arange(d)).ravel()
+        return *found, sparse.csr_array(self.gathers[:, dofs])
 
     def on_free(self, blocks: Array) -> sparse.csc_array:
         """Node blocks as the matrix (n, n) of the free dofs."""

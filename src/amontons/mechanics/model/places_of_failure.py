@@ -11,7 +11,7 @@ from ..contact.current_mortar import MortarMeeting
 from ..contact.current_pairs import Meetings
 from ..elements.hyperelasticity import HyperelasticBody
 from .nonlinear_parts import NonlinearParts
-from .worst_cells import flattest
+from .worst_cells import flattest, turned_corner
 
 Array = NDArray[np.float64]
 FLAT = 0.3  # det F below which a cell is worth a word
@@ -49,10 +49,15 @@ def _bearing(meeting: MortarMeeting) -> NDArray[np.bool_]:
 
 
 def _flat(parts: NonlinearParts, u: Array) -> Iterator[str]:
-    """The flattest cell of each body that has finite strains."""
+    """The flattest cell of each body that has finite strains, and the worst corner.
+
+    A surface that folds turns corners inside out before any integration point.
+    """
     each = zip(parts.names, parts.bodies, np.split(u, parts.ends), strict=True)
     for name, body, own in each:
         if isinstance(body, HyperelasticBody):
             least, cell = flattest(body.mesh, own)
             if least < FLAT:
                 yield f"{cell} of body {name!r} is pressed to det F = {least:.3g}"
+            if corner := turned_corner(body.mesh, own):
+                yield f"{corner} in body {name!r}"

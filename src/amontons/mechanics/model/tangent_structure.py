@@ -48,9 +48,14 @@ def structure_of(
 ) -> Structure:
     """Of a tangent at displacements u (nodes, d); arrays as in `linear.condensed`."""
     of = parts.numbering
-    modes = rigid_modes(parts.X + u, of.part)[parts.free]
+    modes = free_modes(parts, u)
     return Structure(parts.dimension, of.place, of.part, modes, of.unknown[parts.at], by_force,
                      sparse.csr_array(returned))  # fmt: skip
+
+
+def free_modes(parts: NonlinearParts, u: Array) -> Array:
+    """Rigid modes of all pieces at displacements u (nodes, d) on free dofs, (n, 3 or 6)."""
+    return rigid_modes(parts.X + u, parts.numbering.part)[parts.free]
 
 
 def rigid_modes(x: Array, part: Index) -> Array:

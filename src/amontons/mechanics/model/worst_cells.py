@@ -28,6 +28,28 @@ def flattest(mesh: Mesh, u: Array) -> tuple[float, str]:
     return least, told
 
 
+def turned_corner(mesh: Mesh, u: Array) -> str:
+    """The corner that is turned inside out the most at displacements u (n, dim), in words.
+
+    "" for none.  Integration points may all be in front of it: energies do not feel it.
+    """
+    least, told, first = 0.0, "", 0
+    for cells in mesh.cells:
+        cell, x = CELLS[cells.kind], mesh.points[cells.nodes]
+        moved = x + u[cells.nodes]
+        for c, at in enumerate(cell.corners if cell.kind != "pyramid" else ()):
+            ratio = determinant(cell.jacobians(moved, at)) / determinant(cell.jacobians(x, at))
+            k = int(np.where(np.isfinite(ratio), ratio, np.inf).argmin())
+            if ratio[k] < least:
+                least, place = float(ratio[k]), ", ".join(f"{c:.4g}" for c in x[k, c])
+                told = (
+                    f"the corner at ({place}) of {_told(first + k, x[k])} is turned inside "
+                    f"out, det F = {least:.3g} there,"
+                )
+        first += len(cells.nodes)
+    return told
+
+
 def most_strained(mesh: Mesh, u: Array) -> str:
     """The cell with the largest strain C - 1, in words."""
     most, told, first = -1.0, "", 0

@@ -25,7 +25,7 @@ from .bodies import GROUND, Packed
 Array = NDArray[np.float64]
 Index = NDArray[np.int64]
 FACES_FIRST = 1e-3  # of the size: edges must be apart by so much more than faces to decide
-MOST = 64  # corners of a face that is cut
+SPARE = 16  # corners that rounding may add to a face that is cut
 PLACES = 1 << 20  # features of one pair that are told from each other
 
 
@@ -270,15 +270,15 @@ def _on_face(  # noqa: PLR0913
         cosine = dot(n[f], normal)
         if cosine < lowest:
             against, lowest = f, cosine
-    polygon, cut = np.empty((MOST, 3)), np.empty((MOST, 3))
-    marks, kept = np.empty(MOST, np.int64), np.empty(MOST, np.int64)
+    begin, end = first_corner[face], first_corner[face + 1]
+    room = first_corner[against + 1] - first_corner[against] + end - begin + SPARE
+    polygon, cut = np.empty((room, 3)), np.empty((room, 3))
+    marks, kept = np.empty(room, np.int64), np.empty(room, np.int64)
     size = 0
     for c in range(first_corner[against], first_corner[against + 1]):
-        if size < MOST:
-            polygon[size] = v[corners[c]]
-            marks[size] = corners[c] - first_vertex[j]
-            size += 1
-    begin, end = first_corner[face], first_corner[face + 1]
+        polygon[size] = v[corners[c]]
+        marks[size] = corners[c] - first_vertex[j]
+        size += 1
     for c in range(begin, end):
         p = v[corners[c]]
         q = v[corners[c + 1 if c + 1 < end else begin]]
@@ -288,10 +288,10 @@ def _on_face(  # noqa: PLR0913
         for k in range(size):
             a, b = polygon[k], polygon[k + 1 if k + 1 < size else 0]
             da, db = dot(out, a - p), dot(out, b - p)
-            if da <= 0 and number < MOST:
+            if da <= 0 and number < room:
                 cut[number], kept[number] = a, marks[k]
                 number += 1
-            if (da < 0) != (db < 0) and da != db and da != 0 and db != 0 and number < MOST:
+            if (da < 0) != (db < 0) and da != db and da != 0 and db != 0 and number < room:
                 t = da / (da - db)
                 for d in range(3):
                     cut[number, d] = a[d] + t * (b[d] - a[d])

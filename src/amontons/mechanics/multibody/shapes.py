@@ -22,7 +22,11 @@ from ...core.errors import InvalidInput, shown
 Array = NDArray[np.float64]
 Index = NDArray[np.int64]
 FLAT = 1e-9  # volume, relative to that of the box around it, below which points lie in a plane
-COPLANAR = 1e-8  # difference of normals and, relative to the size, of offsets of one face
+PARALLEL = 1e-8  # sine below which edges have one direction
+# Relative to the size, from the plane of a face, as of coordinates in six digits: so much do
+# bodies overlap, too.  Halves of a face that are taken for two faces carry on one half alone.
+EVEN = 1e-5
+ALIKE = 0.5  # cosine of normals of one face at least: thin sides are no part of it
 
 
 class Facets(NamedTuple):
@@ -88,7 +92,9 @@ class Polyhedron:
             hull = ConvexHull(points)
         except QhullError:
             hull = None
-        if hull is None or hull.volume < FLAT * np.prod(np.ptp(points, axis=0)):
+        with np.errstate(over="ignore", under="ignore"):  # volumes that are no numbers, or none
+            around = np.prod(np.ptp(points, axis=0))
+        if hull is None or not FLAT * around < hull.volume < np.inf:
             raise InvalidInput("expected points that do not lie in a plane", ("points",))
         corners = np.unique(hull.simplices)
         object.__setattr__(self, "points", points[corners])
@@ -97,21 +103,31 @@ class Polyhedron:
 
     @cached_property
     def facets(self) -> Facets:
-        """Faces and edges: triangles of the hull in one plane are one face."""
+        """Faces and edges: triangles of the hull in one plane are one face.
+
+        Its normal is that of the sum of their areas, its offset that of its outermost point.
+        """
         triangles, equations = self._triangles
         points = np.asarray(self.points)
-        size = np.ptp(points, axis=0).max()
-        left, faces = list(range(len(triangles))), []
-        while left:
-            normal, offset = equations[left[0], :3], equations[left[0], 3]
-            same = [t for t in left if np.abs(equations[t, :3] - normal).max() <= COPLANAR
-                    and abs(equations[t, 3] - offset) <= COPLANAR * size]  # fmt: skip
-            left = [t for t in left if t not in same]
-            faces.append((normal, -offset, np.unique(triangles[same])))
-        loops = tuple(_around(points, normal, corners) for normal, _, corners in faces)
+        even = EVEN * np.ptp(points, axis=0).max()
+        a, b, c = (points[triangles[:, k]] for k in range(3))
+        area = np.linalg.norm(np.cross(b - a, c - a), axis=1)
+        left, normals, offsets, loops = np.arange(len(triangles)), [], [], []
+        while len(left):
+            seed = left[np.argmax(area[left] >= 0.5 * area[left].max())]  # no thin one
+            normal, offset = equations[seed, :3], equations[seed, 3]
+            off = np.abs(points[triangles[left]] @ normal + offset).max(axis=1)
+            same = (off <= even) & (equations[left, :3] @ normal >= ALIKE)
+            same[left == seed] = True
+            normal = area[left[same]] @ equations[left[same], :3]
+            normal /= np.linalg.norm(normal)
+            normals.append(normal)
+            offsets.append((points @ normal).max())
+            loops.append(_around(points, normal, np.unique(triangles[left[same]])))
+            left = left[~same]
         pairs = [np.column_stack([loop, np.roll(loop, -1)]) for loop in loops]
         edges = np.unique(np.sort(np.concatenate(pairs), axis=1), axis=0)
-        return Facets(np.array([f[0] for f in faces]), np.array([f[1] for f in faces]), loops,
+        return Facets(np.array(normals), np.array(offsets), tuple(loops),
                       *_by_direction(points, edges))  # fmt: skip
 
     @cached_property
@@ -167,14 +183,23 @@ def _by_direction(points: Array, edges: Index) -> tuple[Index, Index]:
     while len(left):
         sine = np.linalg.norm(np.cross(along[left], along[left[0]]), axis=1)
         lines.append(sum(map(len, order)))
-        order.append(left[sine <= COPLANAR])
-        left = left[sine > COPLANAR]
+        order.append(left[sine <= PARALLEL])
+        left = left[sine > PARALLEL]
     return edges[np.concatenate(order)], np.array(lines)
 
 
 def _around(points: Array, normal: Array, corners: Index) -> Index:
-    """Corners of a face in order, anticlockwise about its normal."""
+    """Corners of a face in order, anticlockwise about its normal.
+
+    Without those within it or its sides, which uneven coordinates leave.
+    """
+    from scipy.spatial import ConvexHull
+
     centred = points[corners] - points[corners].mean(axis=0)
     first = centred[np.linalg.norm(centred, axis=1).argmax()]
     second = np.cross(normal, first)
-    return corners[np.argsort(np.arctan2(centred @ second, centred @ first))]
+    flat = np.column_stack([centred @ first, centred @ second])
+    if len(corners) > 3:
+        outer = np.sort(ConvexHull(flat).vertices)
+        corners, flat = corners[outer], flat[outer]
+    return corners[np.argsort(np.arctan2(flat[:, 1], flat[:, 0]))]

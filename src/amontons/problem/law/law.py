@@ -254,7 +254,7 @@ def per_contact(name: str, value: ArrayLike) -> Array:
     bad = np.flatnonzero(~np.isfinite(array) | (array < 0))
     if bad.size:
         raise InvalidInput(
-            f"{name}[{bad[0]}]: expected a finite number >= 0, got {array[bad[0]]!r}"
+            f"{name}[{bad[0]}]: expected a finite number >= 0, got {array[bad[0]]:.6g}"
         )
     huge = np.flatnonzero(array > LARGEST)
     if huge.size:

@@ -158,18 +158,30 @@ def _noted(t, marks, found, count):
 
 @njit(cache=True, error_model="numpy")
 def _spread(p_ptr, weights, node, first, place, chosen, blocks, out, marks, found):  # noqa: PLR0913
-    """Add the chosen blocks, each times the weights of its node, at their places in out."""
+    """Add the chosen blocks, each times the weights of its node, at their places in out.
+
+    A block is read once, in nine numbers: as an array it would be read anew after every write.
+    """
     count = 0
     for c in range(len(chosen)):
         e = uint64(chosen[c])
-        i, at = node[e], first[e]
-        for b in range(p_ptr[i], p_ptr[i + 1]):
+        i, at, B = uint64(node[e]), uint64(first[e]), blocks[e]
+        b00, b01, b02 = B[0, 0], B[0, 1], B[0, 2]
+        b10, b11, b12 = B[1, 0], B[1, 1], B[1, 2]
+        b20, b21, b22 = B[2, 0], B[2, 1], B[2, 2]
+        for b in range(uint64(p_ptr[i]), uint64(p_ptr[i + uint64(1)])):
             w, t = weights[b], uint64(place[at])
-            at += 1
+            at += uint64(1)
             count = _noted(t, marks, found, count)
-            for m in range(3):
-                for n in range(3):
-                    out[t, m, n] += w * blocks[e, m, n]
+            out[t, 0, 0] += w * b00
+            out[t, 0, 1] += w * b01
+            out[t, 0, 2] += w * b02
+            out[t, 1, 0] += w * b10
+            out[t, 1, 1] += w * b11
+            out[t, 1, 2] += w * b12
+            out[t, 2, 0] += w * b20
+            out[t, 2, 1] += w * b21
+            out[t, 2, 2] += w * b22
     return count
 
 

@@ -44,9 +44,10 @@ FILL = 60.0  # operations of a factor per entry of M and root of the unknowns, r
 
 @dataclass(frozen=True)
 class FrictionlessInteriorPoint:
-    """The interior point of this module, for contacts without friction, M singular or not.
+    """Interior point on M v = f + H_N p, 0 <= p, 0 <= H_N^T v + w_N: contact without friction.
 
-    It begins at a point of its own; a problem with friction it does not take (Breakdown).
+    M may be singular, bodies held by contact alone.  It begins at a point of its own; a problem
+    with friction or without a load f ends with the outcome BREAKDOWN.  Source: [M], Mehrotra.
     """
 
     form: ClassVar[Form] = Form.GLOBAL

@@ -7,9 +7,11 @@ steps from a state that is known, each begun by a tangent predictor,
     dF/dv dv = -(F(v) + dF/dload dload),
 
 which also moves the prescribed displacements: cells would be inverted by moving these alone.
-Where Newton's method fails from there, it starts from the solution of the tangent problem with
-contact: many contacts that close at once find their statuses together.  Bodies whose cells can
-be inverted begin with it, as nothing else keeps them from passing through their obstacles.
+Another predictor is the solution of the tangent problem with contact: contacts that change
+find their statuses together, where Newton's steps change them ring by ring, the more steps the
+more contacts.  It comes first between bodies that slide, of LARGE ones by some cycles of
+contact multigrid, and where cells can be inverted, as nothing else keeps such bodies from
+passing through obstacles.  Where Newton's method fails from one predictor the next is tried.
 
 Line search: halving until |F| falls below the largest of the last few values; states with
 inverted cells are never accepted.  Where problems say so by `shortest`, it halves until the
@@ -21,14 +23,14 @@ step that the same matrix asks for at the new state is shorter: the natural mono
 
 from __future__ import annotations
 
-from collections.abc import Iterator
-from dataclasses import dataclass
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass, replace
 from typing import Any, ClassVar, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
 
-from ...core.errors import InvertedCells, SingularOperator
+from ...core.errors import InvertedCells, SingularOperator, UnsupportedForm
 from ...core.options import check_options
 from ...linear import LinearSolver
 from ...linear.base import Factor
@@ -44,7 +46,7 @@ from ..contract import (
     check_positive,
 )
 from ..judging import EARLY, first_of, sent
-from .linear_steps import LOOSEST, LinearSteps, forcing
+from .linear_steps import LARGE, LOOSEST, LinearSteps, forcing
 from .states import Linear, PlainStates, States
 
 Array = NDArray[np.float64]
@@ -56,6 +58,8 @@ REPEATED = 1e-12  # relative difference of |F| below which steps go round in cir
 JUMP = "; if the body jumps there, crossing=PathCrossing() of this solver follows it"
 STATUSES = 1e-8  # error of a tangent problem with contact
 CONTACT_STEPS = 300  # iterates in which it has to be reached
+ROUGH = 1e-4  # the same where cycles solve it: what the tangent leaves out is more
+CYCLES = 30  # most of them
 EASY = 8  # Newton steps up to which the next load step may be longer
 
 
@@ -171,8 +175,7 @@ class NonlinearNewton:
                     f"no equilibrium found beyond {share:.4g} of the load: {reason}{hint}"
                 )
             goal = min(1.0, share + step)
-            both = (self._predict, self._predict_contact)
-            for predict in both[::-1] if problem.meets_first else both:
+            for predict in self._predictors(problem):
                 try:
                     first = predict(problem, share, goal, v, target, linear)
                     if goal == 1.0:
@@ -190,6 +193,15 @@ class NonlinearNewton:
             shown.waiting += steps
             share = goal
             step *= 2 if steps <= EASY else 1
+
+    def _predictors(self, problem: NonlinearProblem) -> Sequence[Callable[..., Array]]:
+        """In the order in which they are tried."""
+        tangent, contact = self._predict, self._predict_contact
+        if problem.shortest > 0 and not problem.meets_first:
+            if problem.unknowns >= LARGE[problem.dimension]:
+                return self._predict_by_cycles, tangent, contact
+            return contact, tangent
+        return (contact, tangent) if problem.meets_first else (tangent, contact)
 
     def _predict(
         self, problem: NonlinearProblem, share: float, goal: float, v: Array, target: Target,
@@ -215,6 +227,7 @@ class NonlinearNewton:
         from ..auto.hybrid import Auto  # which takes this method, too
 
         whole = problem.towards(share, goal, v)
+        whole = replace(whole, near_nullspace=None)  # by factors, which are cheaper here
         tangent = whole if whole.law.varies else whole.plain  # with springs behind v
         start = Iterate(np.zeros((tangent.contacts, tangent.dimension)))
         try:
@@ -230,6 +243,28 @@ class NonlinearNewton:
                     break
                 iterate = sent(iterates, Judgement(error, None, target.deadline))
         except (Breakdown, SingularOperator) as reason:
+            raise _Failed(str(reason)) from reason
+        raise _Failed("the tangent problem with contact was not solved")
+
+    def _predict_by_cycles(
+        self, problem: NonlinearProblem, share: float, goal: float, v: Array, target: Target,
+        linear: LinearSteps,
+    ) -> Array:  # fmt: skip
+        """The same to ROUGH, for about the price of one Newton step whatever the size."""
+        from ..multigrid.cycles import ContactMultigrid  # as above
+
+        whole = problem.towards(share, goal, v)
+        tangent, cycles = whole if whole.law.varies else whole.plain, 0
+        start = Iterate(np.zeros((tangent.contacts, tangent.dimension)))
+        try:
+            goal_of_cycles = Target(ROUGH, target.deadline)
+            for iterate in ContactMultigrid().iterates(tangent, start, goal_of_cycles):
+                cycles += iterate.iterations
+                if iterate.v is not None and iterate.own[-1] <= ROUGH:
+                    return iterate.v[: whole.unknowns]
+                if cycles >= CYCLES or target.deadline.passed:
+                    break
+        except (Breakdown, SingularOperator, UnsupportedForm) as reason:
             raise _Failed(str(reason)) from reason
         raise _Failed("the tangent problem with contact was not solved")
 

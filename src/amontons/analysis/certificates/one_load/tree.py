@@ -71,7 +71,7 @@ class DiscTree(DiscSearch):
 class PlaneTree(RegionTree):
     """Regions of a 2D problem; known (nc, 2): the solution, refined and scaled."""
 
-    LOOK = 20.0
+    LOOK = (1.5e7, 1.5e6, 20.0)
 
     def __init__(self, scaled: Scaled, r: Array, deadline: Deadline) -> None:
         super().__init__(scaled, deadline)

@@ -31,7 +31,7 @@ def _push_inplace(stack, top, states, middle, half, span):
 
 
 @njit(cache=True)
-def _undecided(W, load, states, mu, guess):
+def undecided(W, load, states, mu, guess):
     """The contact to decide next, -1 for none: where the guess breaks the law most."""
     nc = len(states)
     u = load.copy()
@@ -116,7 +116,7 @@ def leaves_inplace(  # noqa: PLR0913
         _ends_inplace(q, mu, span, mus, loads, load)
         if exclude(W, states, arcs, mus, loads, most, fastest, y, guess):
             continue
-        i = _undecided(W, load, states, mus[1], guess)
+        i = undecided(W, load, states, mus[1], guess)
         if i >= 0:
             top = _decide_inplace(
                 stack, top, states, arcs[0], arcs[1], span, i, reacts, mus[1], guess

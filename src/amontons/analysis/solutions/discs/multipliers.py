@@ -26,7 +26,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import linalg
 
-from ....core.clock import Deadline, TimeLimit, deadline_of
+from ....core.clock import NEVER, Deadline, TimeLimit, deadline_of
 from ...multipliers.lmi import SMALLEST, find_multipliers, slacks_are_positive
 from ...scaled import Scaled
 from ...tolerances import REFERENCE, SUMMED
@@ -47,6 +47,7 @@ ROUNDS = 4  # of further directions of slip
 # how much a form that is positive between samples is lowered, in parts of what all V may be
 SHIFTS = (0.0, 0.01, 0.09, 0.4, 1.5, 6.0)
 TRIES = 3  # multipliers of one search that are looked at
+PROOF = (3e7, 20.0)  # operations of a proof, and per cube of the reactions
 
 
 @dataclass(frozen=True, eq=False)
@@ -95,6 +96,7 @@ class BoxProblem:
         Of 2D known: r with all that is to be known about it; laws: about it, or about nothing.
         """
         self.scaled, self.regions, self.r = scaled, tuple(regions), r
+        self.deadline: Deadline = NEVER
         self.error = 0.0 if r is None else error * (1 + float(np.abs(r).max(initial=0.0)))
         nc, d = scaled.shape
         self.laws, self.plane_laws = [], laws
@@ -134,20 +136,20 @@ class BoxProblem:
 
         In 3D with more directions of slip where a proof fails between two.
         """
-        deadline, nc = deadline_of(time_limit), len(self.regions)
+        self.deadline, nc = deadline_of(time_limit), len(self.regions)
         extra: list[tuple[float, ...]] = [()] * nc
         if self.Z.shape[1] == 0:  # every r is fixed: a reference is the only one
             V = np.zeros((nc, self.size, self.size))
             return self._answer(self._proved(V, near))
         if self.scaled.dimension == 2:
-            return self._solve_in_plane(deadline, near)
+            return self._solve_in_plane(near)
         for _ in range(ROUNDS):
             groups = self._groups(extra)
             refused: list[list[tuple[int, float]]] = []
             proofs: list[BoxProof] = []
             accept = partial(self._accept, groups, proofs, refused)
             families = [group.turned for group in groups]
-            found = find_multipliers(self.Z, families, accept=accept, time_limit=deadline)
+            found = find_multipliers(self.Z, families, accept=accept, time_limit=self.deadline)
             if proofs:
                 return self._answer(proofs[0])
             if not refused or not refused[-1]:
@@ -156,7 +158,7 @@ class BoxProblem:
                 extra[p] = (*extra[p], angle)
         return self._answer(None)
 
-    def _solve_in_plane(self, deadline: Deadline, near: float) -> BoxAnswer:
+    def _solve_in_plane(self, near: float) -> BoxAnswer:
         """The same in 2D; many contacts share multipliers first."""
         groups = self._groups([()] * len(self.regions))
         plain, proofs = [group.family for group in groups], list[BoxProof]()
@@ -170,7 +172,7 @@ class BoxProblem:
             return proof is not None
 
         alone = too_many(self.scaled)
-        share = deadline if alone else deadline.share(0.5)
+        share = self.deadline if alone else self.deadline.share(0.5)
         if self._is_large and shared_multipliers(
             self.scaled, self.branch, groups, accept, deadline=share
         ):
@@ -178,7 +180,8 @@ class BoxProblem:
         if alone:
             return self._answer(None)
         found = find_multipliers(
-            self.Z, [group.turned for group in groups], accept=accept, time_limit=deadline,
+            self.Z, [group.turned for group in groups], accept=accept,
+            time_limit=self.deadline,
             smallest=HOPELESS if self._divisible else SMALLEST,
         )  # fmt: skip
         if proofs:
@@ -273,7 +276,7 @@ class BoxProblem:
             angle = None
             for share in SHIFTS:
                 V[own] -= share * room * one
-                angle = negative_on_arc(law, region, V[p], error)
+                angle = negative_on_arc(law, region, V[p], error, self.deadline)
                 if angle is None:
                     break
             if angle is not None:
@@ -296,6 +299,7 @@ class BoxProblem:
 
     def _proved(self, V: Array, near: float = np.inf) -> BoxProof | None:
         """The proof with weights on what is fixed, None when M is not surely definite."""
+        self.deadline.spend(PROOF[0] + PROOF[1] * float(self.scaled.q.size) ** 3)
         proof = prove(self.scaled, self.branch, V, self.off,
                       all_reactions=self.scaled.dimension == 3)  # fmt: skip
         if proof is None or proof.distance > near:

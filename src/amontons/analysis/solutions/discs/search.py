@@ -24,7 +24,7 @@ from ...tolerances import ON, REFERENCE, RESOLVED, SOLVED
 from ..enumerate import Solutions, missing, searched
 from ..existence import exist
 from ..multistart import EXTRA, ROUND, Finder, statuses
-from ..newton_batch import newton, on_piece, polished, width
+from ..newton_batch import newton, on_piece, polished, solve_work, width
 from ..region_tree import RegionTree
 from .multipliers import BoxProblem, BoxProof
 from .proof import DiscProof, box_of
@@ -236,6 +236,7 @@ class DiscSearch(RegionTree):
         for _ in range(GHOST_STEPS):
             trial = np.vstack([angle, angle + TURN * np.eye(len(angle))[slip]])
             direction = np.stack([np.cos(trial), np.sin(trial)], axis=2)
+            self.deadline.spend(solve_work(self.scaled, len(trial)))
             r = on_piece(self.scaled, np.tile(states, (len(trial), 1)), direction)
             u = self.scaled.velocity(r)
             across = direction[..., 0] * u[..., 2] - direction[..., 1] * u[..., 1]
@@ -304,7 +305,8 @@ class DiscSearch(RegionTree):
 
     def _newton(self, regions: Regions) -> bool:
         """True when Newton's method from a region finds a solution that was not known."""
-        reached = newton(self.scaled, self._start(regions), np.random.default_rng(0))
+        reached = newton(self.scaled, self._start(regions), np.random.default_rng(0),
+                         deadline=self.deadline)  # fmt: skip
         return any([self.finder.add(r) for r in reached])
 
     def _settle(self, regions: Regions, known: bool) -> None:

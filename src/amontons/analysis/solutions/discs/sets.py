@@ -31,6 +31,7 @@ from itertools import combinations
 import numpy as np
 from numpy.typing import NDArray
 
+from ....core.clock import NEVER, Deadline
 from ...statuses import States, states_of
 from ...tolerances import ON, SUMMED
 from ..groups import Form
@@ -40,6 +41,7 @@ SAMPLES = 16  # directions of a full circle
 FEWEST = 6  # of an arc: a form of e has five coefficients
 INTERVALS, PARTS, DIVISIONS = 96, 12, 5  # of directions: at first, of one, how often divided
 MOST = 20_000  # intervals at a time
+LOOK = (3e6, 5e4)  # operations of a look at intervals, and of each
 NEAR = 0.3  # rad from e0 within which the span replaces the cone
 
 
@@ -198,17 +200,21 @@ def forms_of(
 
 
 # ------------------------------------------------------------------ proof on an arc
-def negative_on_arc(law: Law, region: Region, V: Array, uncertainty: float) -> float | None:
+def negative_on_arc(
+    law: Law, region: Region, V: Array, uncertainty: float, deadline: Deadline = NEVER
+) -> float | None:
     """None when d^T V d < 0 is proved for all slip of a region, else an angle where it is not.
 
     Between two directions a form is at least the mean of its values there less what its second
     derivative bends it; means of copositive matrices are copositive.  uncertainty: of z0.
+    deadline: where operations are counted.
     """
     first, last = region.middle - region.half, region.middle + region.half
     count = max(2, int(np.ceil(region.half / np.pi * INTERVALS)) + 1)
     ends = np.linspace(first, last, count)
     intervals = np.column_stack([ends[:-1], ends[1:]])
     for _ in range(DIVISIONS):
+        deadline.spend(LOOK[0] + LOOK[1] * len(intervals))
         good, wrong = _negative_between(law, intervals, V, uncertainty)
         if wrong is not None or good.all():
             return wrong
