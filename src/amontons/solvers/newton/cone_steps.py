@@ -49,9 +49,10 @@ def nesterov_todd_inplace(x, y, i, beta, w, lam):
 def scaled_blocks_inplace(x, y, mu, shift, i, beta, w, lam, E, inverse):
     """Scaling (beta, w) and lambda of contact i, and its blocks E = S^-1 (D + e 1) S^-1, E^-1.
 
-    D = k (2 w w^T - J), J = diag(1, -1, -1), has the eigenvalues k g^2, k / g^2 and k, g = w_0 +
-    |w_T|, on (1, n), (1, -n) and across, n along w_T: nothing cancels, in the inverse neither.
-    e: at least shift on each component of E.  Both are zero on tangents where mu = 0.
+    D = k (2 w w^T - J), J = diag(1, -1, -1), has the eigenvalues k g^2, k / g^2 and k, with
+    g = w_0 + |w_T|, on (1, n), (1, -n) and across, n along w_T: nothing cancels, in the inverse
+    neither.  S = diag(1 / mu, 1, 1); e: at least shift on each component of E.  Where mu = 0
+    both blocks are zero on the tangents.
     """
     k = nesterov_todd_inplace(x, y, i, beta, w, lam)
     along = math.sqrt(w[i, 1] ** 2 + w[i, 2] ** 2)

@@ -9,8 +9,9 @@ and a step (W + E) dr = f with E block diagonal and regular is [W], six unknowns
     (X + K) p = K h,   K_g = (sum_i L_i^T E_i^-1 L_i)^-1,   h_g = sum_i L_i^T E_i^-1 f_i,
     dr_i = E_i^-1 (f_i - L_i K_g (h_g - p_g)),
 
-p_g = sum_i L_i^T dr_i.  Contacts that share none keep their three unknowns: L = 1, K = E.  On a
-wall whose faces have nine contacts that is a factor for a hundredth of the operations.
+p_g = sum_i L_i^T dr_i; `face_steps` says how, without loss of digits.  Contacts that share none
+keep their three unknowns: L = 1, K = E.  On a wall whose faces have nine contacts that is
+a factor for a hundredth of the operations.
 Nothing is known of bodies here but W.  Contacts with the same pattern in W are tried one after
 another: a face takes them while the rank of its own part of W stays at six at most, told by
 Cholesky's factor, whose rows are L; what it predicts is compared with all of W.
@@ -38,8 +39,9 @@ FEWEST = 3  # contacts of a face: two have six components as well
 # Of a contact's block, from which a row of W counts as independent of others; error of what
 # faces predict of W, of its largest entry, from which there are none.
 INDEPENDENT, WRONG = 1e-9, 1e-8
-# Work of a contact on a face, in products of blocks, and what part faces may leave of a factor.
-SHARED, WORTH = 80, 0.5
+# Work of a contact on a face and of a block of X, in products of blocks; what part of the work
+# of a factor faces may leave.
+SHARED, TURNED, WORTH = 80, 8, 0.5
 
 
 class Faces(NamedTuple):
@@ -128,9 +130,7 @@ def _faces(indptr, indices, data, rho, order, starts):
                 g = len(first) - 1
                 for m in range(k, end):
                     c = order[m]
-                    _rows_inplace(
-                        indptr, indices, data, c, at, component, factor, count, rows
-                    )
+                    _rows_inplace(indptr, indices, data, c, at, component, factor, count, rows)
                     for b in range(3):
                         levers[c, b, :count] = rows[:count, b]
                     face[c], contacts[filled] = g, c
@@ -297,6 +297,11 @@ def _sets(indptr: Any, indices: Any) -> tuple[NDArray[np.int64], NDArray[np.int6
     return order, np.concatenate([[0], ends, [nc]])
 
 
+def _work(symbolic: Symbolic, contacts: int, blocks: int) -> int:
+    """Of a step with so many contacts and blocks of X, in products of blocks."""
+    return symbolic.products + SHARED * contacts + TURNED * blocks
+
+
 @dataclass(frozen=True, eq=False)
 class FaceMatrix:
     """Faces of a problem and the symbolic factor of X + K."""
@@ -312,11 +317,18 @@ class FaceMatrix:
     @property
     def products(self) -> int:
         """Products of 3x3 blocks that a step costs, or as many operations."""
-        return self.symbolic.products + SHARED * len(self.faces.face)
+        if not self.faces.rank.size:
+            return self.symbolic.products
+        return _work(self.symbolic, len(self.faces.face), len(self.faces.indices))
 
     @classmethod
-    def of(cls, problem: FrictionProblem, whole: Symbolic) -> FaceMatrix:
-        """Of W; without faces where it has none, or they leave half of the work of `whole`."""
+    def of(cls, problem: FrictionProblem) -> FaceMatrix:
+        """Of W, once for all variants with it; no faces where they leave half of the work."""
+        return problem.kept(cls._kept)
+
+    @classmethod
+    def _kept(cls, problem: FrictionProblem) -> FaceMatrix:
+        whole = Symbolic.of(problem)
         return cls._of(problem, whole.products) or cls(NONE, whole)
 
     @classmethod
@@ -332,7 +344,7 @@ class FaceMatrix:
             return None
         place, indptr, indices = _pattern(b.indptr, b.indices, face, first, contacts)
         symbolic = analyse_pattern(indptr, indices)
-        if symbolic.products + SHARED * len(face) > WORTH * products:
+        if _work(symbolic, len(face), len(indices)) > WORTH * products:
             return None
         X = _fill(
             b.indptr, b.indices, b.data, face, rank, place, indptr, indices, pivots, first,

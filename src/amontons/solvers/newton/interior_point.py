@@ -53,7 +53,7 @@ from .cone_steps import (
     room,
     scaled_blocks_inplace,
 )
-from .face_steps import REFINED, add_step_inplace, face_matrix_inplace, missed_inplace
+from .face_steps import face_memory, factorise_faces_inplace, step_by_faces_inplace
 from .faces import NONE
 from .smoothing import PINNED, Workspace
 
@@ -88,14 +88,11 @@ def _newton_block(x, y, mu, shift, i, beta, w, lam, extra):
 @njit(cache=True, error_model="numpy")
 def relax_inplace(  # noqa: PLR0913
     indptr, indices, data, q, kind, parameters, rho, order, upper_start, upper, lower_start,
-    lower,
-    faces, r, x, y, s, shift, goal, steps, short,
+    lower, faces, r, x, y, s, shift, goal, steps, short,
 ):  # fmt: skip
     """Predictor-corrector steps on (r, x, y) with s frozen; x and y inside the cones on entry.
 
-    faces: contacts that share some, `faces.Faces`; order to lower: of a factor of W, with faces
-    of X.
-
+    order to lower: a factor's symbols, of W, or of X where faces (`faces.Faces`) has some.
     short (1,): short steps in a row so far, with which a call goes on where the last one ended.
     shift: added to the diagonal, relative to |W_ii|; goal: error, unit of u, at which to stop.
     Returns steps done, -1 less those where no step helps; r is the last iterate, and finite.
@@ -103,10 +100,8 @@ def relax_inplace(  # noqa: PLR0913
     mu = parameters[:, MU].copy()
     nc, n, sharing = len(mu), len(order), len(faces.first) > 1
     extra, inverse, work = np.zeros((nc, 3, 3)), np.empty((n, 3, 3)), np.zeros((n, 3, 3))
-    shared, units = len(faces.face), len(faces.indptr) - 1
-    matrix, none = np.empty((len(faces.indices), 3, 3)), np.zeros((units, 3, 3))
-    h, p, K = np.empty((units, 3)), np.empty((units, 3)), np.empty((len(faces.rank), 6, 6))
-    turned, rest = np.zeros((shared, 3, 3)), np.empty((shared, 3))
+    turned, memory = np.zeros((len(faces.face), 3, 3)), face_memory(faces)
+    symbolic = order, upper_start, upper, lower_start, lower
     U, L = np.empty((len(upper), 3, 3)), np.empty((len(upper), 3, 3))
     zero, u, du = np.zeros((nc, 3)), np.empty((nc, 3)), np.empty((nc, 3))
     rhs, dr = np.zeros((nc, 3)), np.empty((nc, 3))
@@ -144,13 +139,8 @@ def relax_inplace(  # noqa: PLR0913
             else:
                 _newton_block(x, y, mu[i], shift / rho[i], i, beta, w, lam, extra)
         mean = total / max(able, 1)
-        factor = order, upper_start, upper, lower_start, lower, U, L, inverse
         if sharing:
-            face_matrix_inplace(faces, extra, turned, matrix, K)
-            regular = factorise_inplace(
-                faces.indptr, faces.indices, matrix, none, order, upper_start, upper,
-                lower_start, lower, U, L, inverse, work,
-            )  # fmt: skip
+            regular = factorise_faces_inplace(faces, extra, turned, symbolic, U, L, memory)
         else:
             regular = factorise_inplace(
                 indptr, indices, data, extra, order, upper_start, upper, lower_start, lower,
@@ -162,16 +152,17 @@ def relax_inplace(  # noqa: PLR0913
         for phase in range(2):
             right_side_inplace(phase, sigma, mean, mu, rho, lam, beta, w, dx, dy, residual, rhs)
             if sharing:
-                dr[:] = du[:] = 0.0
-                for _ in range(REFINED):
-                    missed_inplace(extra, rhs, dr, du, rest)
-                    add_step_inplace(faces, turned, K, factor, rest, h, p, dr)
-                    velocity_of_rows_inplace(0, len(q), indptr, indices, data, zero, dr, du)
+                step_by_faces_inplace(
+                    (indptr, indices, data), faces, extra, turned, symbolic, U, L, memory, rhs,
+                    dr, du,
+                )  # fmt: skip
             else:
                 solve_inplace(
                     order, upper_start, upper, lower_start, lower, U, L, inverse, rhs, dr
                 )
                 velocity_of_rows_inplace(0, len(q), indptr, indices, data, zero, dr, du)
+            if not math.isfinite(np.sum(du)):
+                return -1 - count
             changes_inplace(1.0 - sigma, mu, rho, residual, dr, du, dx, dy)
             length = min(room(x, dx, rho), room(y, dy, rho))
             if not length > 0.0:

@@ -299,7 +299,7 @@ class Workspace:
     @cached_property
     def sharing(self) -> FaceMatrix:
         """Faces that contacts share, for steps of interior points."""
-        return FaceMatrix.of(self.problem, self.symbolic)
+        return FaceMatrix.of(self.problem)
 
     @property
     def step_seconds(self) -> float:
