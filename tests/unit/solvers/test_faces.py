@@ -96,11 +96,10 @@ def test_scaling_takes_reactions_to_velocities(mu, inside):
     assert np.allclose(E[0] @ inverse[0], np.eye(3), rtol=0, atol=1e-14 * size)
 
 
-@pytest.mark.parametrize("mu", [0.0, 0.5])
+@pytest.mark.parametrize("mu", [0.0, 0.5, 2.0])
 def test_relaxation_keeps_its_digits_with_faces(mu):
     """To the last digits by faces alone: the factor of the whole is never called for."""
-    W, q = pile()
-    problem = problem_of(W, q + 2e-1 * (mu > 0) * np.array([-1.0, 0, 0]), mu)
+    problem = problem_of(*pile(), mu)
     work = Workspace.of(problem)
     relaxation = Relaxation.of(work, np.zeros(problem.contacts), 1e-10)
     assert relaxation.advance(1e-11 * problem.q_norm, 40) < 30
