@@ -51,7 +51,10 @@ from .cone_steps import (
     nesterov_todd_inplace,
     right_side_inplace,
     room,
+    scaled_blocks_inplace,
 )
+from .face_steps import face_memory, factorise_faces_inplace, step_by_faces_inplace
+from .faces import NONE
 from .smoothing import PINNED, Workspace
 
 Array = NDArray[np.float64]
@@ -85,18 +88,20 @@ def _newton_block(x, y, mu, shift, i, beta, w, lam, extra):
 @njit(cache=True, error_model="numpy")
 def relax_inplace(  # noqa: PLR0913
     indptr, indices, data, q, kind, parameters, rho, order, upper_start, upper, lower_start,
-    lower,
-    r, x, y, s, shift, goal, steps, short,
+    lower, faces, r, x, y, s, shift, goal, steps, short,
 ):  # fmt: skip
     """Predictor-corrector steps on (r, x, y) with s frozen; x and y inside the cones on entry.
 
+    order to lower: a factor's symbols, of W, or of X where faces (`faces.Faces`) has some.
     short (1,): short steps in a row so far, with which a call goes on where the last one ended.
     shift: added to the diagonal, relative to |W_ii|; goal: error, unit of u, at which to stop.
-    Returns steps done; r is the last iterate, and finite.
+    Returns steps done, -1 less those where no step helps; r is the last iterate, and finite.
     """
     mu = parameters[:, MU].copy()
-    nc = len(mu)
-    extra, inverse, work = np.zeros((nc, 3, 3)), np.empty((nc, 3, 3)), np.zeros((nc, 3, 3))
+    nc, n, sharing = len(mu), len(order), len(faces.first) > 1
+    extra, inverse, work = np.zeros((nc, 3, 3)), np.empty((n, 3, 3)), np.zeros((n, 3, 3))
+    turned, memory = np.zeros((len(faces.face), 3, 3)), face_memory(faces)
+    symbolic = order, upper_start, upper, lower_start, lower
     U, L = np.empty((len(upper), 3, 3)), np.empty((len(upper), 3, 3))
     zero, u, du = np.zeros((nc, 3)), np.empty((nc, 3)), np.empty((nc, 3))
     rhs, dr = np.zeros((nc, 3)), np.empty((nc, 3))
@@ -127,28 +132,47 @@ def relax_inplace(  # noqa: PLR0913
                     extra[i, a, a] = 1e300
                 continue
             total += x[i, 0] * y[i, 0] + x[i, 1] * y[i, 1] + x[i, 2] * y[i, 2]
-            _newton_block(x, y, mu[i], shift / rho[i], i, beta, w, lam, extra)
+            if sharing and faces.face[i] >= 0:
+                scaled_blocks_inplace(
+                    x, y, mu[i], shift / rho[i], i, beta, w, lam, extra, turned
+                )
+            else:
+                _newton_block(x, y, mu[i], shift / rho[i], i, beta, w, lam, extra)
         mean = total / max(able, 1)
-        if not factorise_inplace(
-            indptr, indices, data, extra, order, upper_start, upper, lower_start, lower,
-            U, L, inverse, work,
-        ):  # fmt: skip
-            return count
+        if sharing:
+            regular = factorise_faces_inplace(faces, extra, turned, symbolic, U, L, memory)
+        else:
+            regular = factorise_inplace(
+                indptr, indices, data, extra, order, upper_start, upper, lower_start, lower,
+                U, L, inverse, work,
+            )  # fmt: skip
+        if not regular:
+            return -1 - count
         sigma = length = 0.0
         for phase in range(2):
             right_side_inplace(phase, sigma, mean, mu, rho, lam, beta, w, dx, dy, residual, rhs)
-            solve_inplace(order, upper_start, upper, lower_start, lower, U, L, inverse, rhs, dr)
-            velocity_of_rows_inplace(0, len(q), indptr, indices, data, zero, dr, du)
+            if sharing:
+                step_by_faces_inplace(
+                    (indptr, indices, data), faces, extra, turned, symbolic, U, L, memory, rhs,
+                    dr, du,
+                )  # fmt: skip
+            else:
+                solve_inplace(
+                    order, upper_start, upper, lower_start, lower, U, L, inverse, rhs, dr
+                )
+                velocity_of_rows_inplace(0, len(q), indptr, indices, data, zero, dr, du)
+            if not math.isfinite(np.sum(du)):
+                return -1 - count
             changes_inplace(1.0 - sigma, mu, rho, residual, dr, du, dx, dy)
             length = min(room(x, dx, rho), room(y, dy, rho))
             if not length > 0.0:
-                return count
+                return -1 - count
             length = min(1.0, length * (1.0 if phase == 0 else BOUNDARY))
             if phase == 0:
                 sigma = centering(x, y, dx, dy, rho, length, total)
         short[0] = short[0] + 1 if length < SHORT else 0
         if short[0] > STALLED:
-            return count
+            return -1 - count
         advance_inplace(x, y, r, dx, dy, mu, rho, length)
     return steps
 
@@ -202,9 +226,11 @@ class InteriorPoint:
         self, work: Workspace, slip: Array, goal: float, deadline: Deadline = NEVER
     ) -> tuple[int, Array]:
         """(steps, r) of the relaxation with frozen |u_T|, (nc,); goal: error, unit of u."""
-        relaxation = Relaxation.of(work, slip, self.shift)
-        steps = relaxation.advance(goal, work.affordable(self.steps, deadline))
-        return max(steps, 1), relaxation.r
+        relaxation, done = Relaxation.of(work, slip, self.shift), 0
+        most = work.affordable(self.steps, deadline)
+        while done < most and not relaxation.ended:
+            done += relaxation.advance(goal, most - done)
+        return max(done, 1), relaxation.r
 
 
 @dataclass(eq=False)
@@ -218,6 +244,8 @@ class Relaxation:
     y: Array
     r: Array
     short: Index = field(default_factory=lambda: np.zeros(1, dtype=np.int64))
+    shares: bool = True  # steps by faces, where there are; no more once none of them helps
+    ended: bool = False
 
     @classmethod
     def of(cls, work: Workspace, slip: Array, shift: float) -> Relaxation:
@@ -230,11 +258,23 @@ class Relaxation:
         return cls(work, np.where(mu > 0, slip, 0.0), shift, x, y, r)
 
     def advance(self, goal: float, steps: int) -> int:
-        """Steps done of some, fewer at its end; goal: error, unit of u."""
-        return relax_inplace(
-            *self.work.problem.kernel_data, *self.work.symbolic.arrays, self.r, self.x, self.y,
-            self.slip, self.shift, goal, steps, self.short,
+        """Steps done of some, fewer where its way changes or ends; goal: error, unit of u.
+
+        The factor of the whole, which loses fewer digits, goes on where that by faces has come
+        to its last.
+        """
+        sharing = self.work.sharing
+        self.shares = self.shares and sharing.faces is not NONE
+        arrays = sharing.arrays if self.shares else (*self.work.symbolic.arrays, NONE)
+        done = relax_inplace(
+            *self.work.problem.kernel_data, *arrays, self.r, self.x, self.y, self.slip,
+            self.shift, goal, steps, self.short,
         )  # fmt: skip
+        if done < 0 and self.shares:
+            self.shares, self.short[0] = False, 0
+            return -1 - done
+        self.ended = done < steps
+        return done if done >= 0 else -1 - done
 
 
 def sliding_speed(problem: FrictionProblem, r: Array) -> Array:
