@@ -96,6 +96,27 @@ def test_scaling_takes_reactions_to_velocities(mu, inside):
     assert np.allclose(E[0] @ inverse[0], np.eye(3), rtol=0, atol=1e-14 * size)
 
 
+def test_step_where_faces_are_singular_in_double_precision():
+    """Normals alone press, twenty powers of ten apart: (W + E) dr = f in all components.
+
+    Rounding of f, here about 1e-15, comes into dr times E^-1 = 1e10, and one more solution
+    takes as much off what is left again: two solutions leave (30 1e-15 1e10)^2 at most, a
+    second call with what is left nothing but rounding.
+    """
+    W, q = pile()
+    problem = problem_of(W, q)
+    found = FaceMatrix.of(problem)
+    size = np.tile([1e-10, 1e10, 1e10], (len(q), 1))
+    E, inverse = np.eye(3) * size[:, None], np.eye(3) / size[:, None]
+    exact = np.random.default_rng(2).standard_normal(q.shape) / size.clip(1)
+    f = (W @ exact.ravel()).reshape(q.shape) + size * exact
+    dr, left = np.zeros_like(f), f
+    for most in (1e-7, 1e-13):
+        dr += solved(found, E, inverse, left, problem.blocks)
+        left = f - (W @ dr.ravel()).reshape(q.shape) - size * dr
+        assert np.abs(left).max() <= most * np.abs(f).max()
+
+
 @pytest.mark.parametrize("mu", [0.0, 0.5, 2.0])
 def test_relaxation_keeps_its_digits_with_faces(mu):
     """To the last digits by faces alone: the factor of the whole is never called for."""

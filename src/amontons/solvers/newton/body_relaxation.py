@@ -31,6 +31,7 @@ from .cone_steps import (
     advance_inplace,
     centering,
     changes_inplace,
+    residual_inplace,
     right_side_inplace,
     room,
     scaled_blocks_inplace,
@@ -221,28 +222,15 @@ def relax_on_bodies_inplace(  # noqa: PLR0913
     for count in range(steps):
         driven_inplace(levers, sides, r, turned)
         felt_inplace(levers, sides, turned, u)
-        gap = away = total = 0.0
-        free = 0
+        u += q
+        left, total, free = residual_inplace(x, y, u, s, mu, able, rho, residual)
         for i in range(n):
-            for a in range(3):
-                u[i, a] += q[i, a]
-            if able[i] <= 0.0:
-                if kind[i] == TIED:
-                    for a in range(3):
-                        residual[i, a] = -u[i, a]
-                        away += u[i, a] ** 2
-                continue
-            free += 1
-            scale = 1.0 / mu[i] if mu[i] > 0.0 else 1.0
-            residual[i, 0] = y[i, 0] - scale * u[i, 0] - s[i]
-            for a in range(1, 3):
-                residual[i, a] = y[i, a] - u[i, a] if mu[i] > 0.0 else 0.0
-            for a in range(3):
-                total += x[i, a] * y[i, a]
-                gap += max(x[i, a] * y[i, a], 0.0) / rho[i]
-                away += residual[i, a] ** 2
+            if kind[i] == TIED:
+                for a in range(3):
+                    residual[i, a] = -u[i, a]
+                    left += u[i, a] ** 2
         error = natural_error(blocks[0], blocks[1], blocks[2], q, kind, law[1], rho, r)
-        if error <= goal or math.sqrt(away + gap) <= max(ENOUGH * error, 0.1 * goal):
+        if error <= goal or math.sqrt(left) <= max(ENOUGH * error, 0.1 * goal):
             return count
         for i in range(n):
             if able[i] > 0.0:

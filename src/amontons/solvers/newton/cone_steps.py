@@ -101,6 +101,29 @@ def room(x, dx, rho):
 
 
 @njit(cache=True, error_model="numpy")
+def residual_inplace(x, y, u, s, mu, able, rho, residual):  # noqa: PLR0913
+    """residual = y - S u - s e_N, S = diag(1/mu, 1, 1), of the contacts with able above 0.
+
+    Returns the sum of its squares and of what x . y leaves in the unit of u, x . y, and how
+    many contacts these are.
+    """
+    left = total = 0.0
+    count = 0
+    for i in range(len(mu)):
+        if able[i] <= 0.0:
+            continue
+        count += 1
+        scale = 1.0 / mu[i] if mu[i] > 0.0 else 1.0
+        residual[i, 0] = y[i, 0] - scale * u[i, 0] - s[i]
+        for a in range(1, 3):
+            residual[i, a] = y[i, a] - u[i, a] if mu[i] > 0.0 else 0.0
+        for a in range(3):
+            total += x[i, a] * y[i, a]
+            left += max(x[i, a] * y[i, a], 0.0) / rho[i] + residual[i, a] ** 2
+    return left, total, count
+
+
+@njit(cache=True, error_model="numpy")
 def right_side_inplace(phase, sigma, mean, mu, able, lam, beta, w, dx, dy, residual, f):  # noqa: PLR0913
     """f (n, 3) of the predictor (phase 0) or, with its dx and dy, of the corrector.
 

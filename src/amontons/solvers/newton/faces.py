@@ -334,6 +334,8 @@ class FaceMatrix:
     @classmethod
     def _of(cls, problem: FrictionProblem, products: int) -> FaceMatrix | None:
         b, rho = problem.blocks, problem.kernel_data[6]
+        if SHARED * problem.contacts > WORTH * products:
+            return None
         order, starts = _sets(b.indptr, b.indices)
         if not (np.diff(starts) >= FEWEST).any():
             return None

@@ -49,6 +49,7 @@ from .cone_steps import (
     centering,
     changes_inplace,
     nesterov_todd_inplace,
+    residual_inplace,
     right_side_inplace,
     room,
     scaled_blocks_inplace,
@@ -86,6 +87,47 @@ def _newton_block(x, y, mu, shift, i, beta, w, lam, extra):
 
 
 @njit(cache=True, error_model="numpy")
+def _scalings_inplace(faces, x, y, mu, rho, shift, scaling, extra, turned):  # noqa: PLR0913
+    """Scaling of every contact and its block E in extra; E^-1 of those on faces in turned."""
+    beta, w, lam = scaling
+    sharing = len(faces.first) > 1
+    for i in range(len(mu)):
+        if rho[i] <= 0.0:
+            for a in range(3):
+                extra[i, a, a] = 1e300
+        elif sharing and faces.face[i] >= 0:
+            scaled_blocks_inplace(x, y, mu[i], shift / rho[i], i, beta, w, lam, extra, turned)
+        else:
+            _newton_block(x, y, mu[i], shift / rho[i], i, beta, w, lam, extra)
+
+
+@njit(cache=True, error_model="numpy")
+def _factorised_inplace(W, faces, extra, turned, symbolic, factor):
+    """False at a singular pivot; factor: U, L, pivots, work and the memory of faces."""
+    U, L, pivots, work, memory = factor
+    if len(faces.first) > 1:
+        return factorise_faces_inplace(faces, extra, turned, symbolic, U, L, memory)
+    order, upper_start, upper, lower_start, lower = symbolic
+    return factorise_inplace(
+        W[0], W[1], W[2], extra, order, upper_start, upper, lower_start, lower, U, L, pivots,
+        work,
+    )  # fmt: skip
+
+
+@njit(cache=True, error_model="numpy")
+def _solved_inplace(W, faces, extra, turned, symbolic, factor, f, dr, du):  # noqa: PLR0913
+    """dr (nc, 3) = (W + E)^-1 f and du = W dr; False where they are not finite."""
+    U, L, pivots, _, memory = factor
+    if len(faces.first) > 1:
+        step_by_faces_inplace(W, faces, extra, turned, symbolic, U, L, memory, f, dr, du)
+    else:
+        order, upper_start, upper, lower_start, lower = symbolic
+        solve_inplace(order, upper_start, upper, lower_start, lower, U, L, pivots, f, dr)
+        velocity_of_rows_inplace(0, len(f), W[0], W[1], W[2], np.zeros(f.shape), dr, du)
+    return math.isfinite(np.sum(du))
+
+
+@njit(cache=True, error_model="numpy")
 def relax_inplace(  # noqa: PLR0913
     indptr, indices, data, q, kind, parameters, rho, order, upper_start, upper, lower_start,
     lower, faces, r, x, y, s, shift, goal, steps, short,
@@ -97,71 +139,33 @@ def relax_inplace(  # noqa: PLR0913
     shift: added to the diagonal, relative to |W_ii|; goal: error, unit of u, at which to stop.
     Returns steps done, -1 less those where no step helps; r is the last iterate, and finite.
     """
-    mu = parameters[:, MU].copy()
-    nc, n, sharing = len(mu), len(order), len(faces.first) > 1
-    extra, inverse, work = np.zeros((nc, 3, 3)), np.empty((n, 3, 3)), np.zeros((n, 3, 3))
-    turned, memory = np.zeros((len(faces.face), 3, 3)), face_memory(faces)
+    mu, W = parameters[:, MU].copy(), (indptr, indices, data)
+    nc, n = len(mu), len(order)
+    extra, turned = np.zeros((nc, 3, 3)), np.zeros((len(faces.face), 3, 3))
     symbolic = order, upper_start, upper, lower_start, lower
-    U, L = np.empty((len(upper), 3, 3)), np.empty((len(upper), 3, 3))
-    zero, u, du = np.zeros((nc, 3)), np.empty((nc, 3)), np.empty((nc, 3))
-    rhs, dr = np.zeros((nc, 3)), np.empty((nc, 3))
+    factor = (
+        np.empty((len(upper), 3, 3)), np.empty((len(upper), 3, 3)), np.empty((n, 3, 3)),
+        np.zeros((n, 3, 3)), face_memory(faces),
+    )  # fmt: skip
+    u, du, rhs, dr = (
+        np.empty((nc, 3)), np.empty((nc, 3)), np.zeros((nc, 3)), np.empty((nc, 3)),
+    )  # fmt: skip
     dx, dy, residual = np.zeros((nc, 3)), np.zeros((nc, 3)), np.zeros((nc, 3))
     lam, w, beta = np.empty((nc, 3)), np.empty((nc, 3)), np.empty(nc)
     for count in range(steps):
         velocity_of_rows_inplace(0, len(q), indptr, indices, data, q, r, u)
-        gap = away = 0.0
-        able = 0
-        for i in range(nc):
-            if rho[i] <= 0.0:
-                continue
-            able += 1
-            scale = 1.0 / mu[i] if mu[i] > 0.0 else 1.0
-            residual[i, 0] = y[i, 0] - scale * u[i, 0] - s[i]
-            for a in range(1, 3):
-                residual[i, a] = y[i, a] - u[i, a] if mu[i] > 0.0 else 0.0
-            for a in range(3):
-                gap += max(x[i, a] * y[i, a], 0.0) / rho[i]
-                away += residual[i, a] ** 2
+        left, total, able = residual_inplace(x, y, u, s, mu, rho, rho, residual)
         error = natural_error(indptr, indices, data, q, kind, parameters, rho, r)
-        if error <= goal or math.sqrt(away + gap) <= max(ENOUGH * error, 0.1 * goal):
+        if error <= goal or math.sqrt(left) <= max(ENOUGH * error, 0.1 * goal):
             return count
-        total = 0.0
-        for i in range(nc):
-            if rho[i] <= 0.0:
-                for a in range(3):
-                    extra[i, a, a] = 1e300
-                continue
-            total += x[i, 0] * y[i, 0] + x[i, 1] * y[i, 1] + x[i, 2] * y[i, 2]
-            if sharing and faces.face[i] >= 0:
-                scaled_blocks_inplace(
-                    x, y, mu[i], shift / rho[i], i, beta, w, lam, extra, turned
-                )
-            else:
-                _newton_block(x, y, mu[i], shift / rho[i], i, beta, w, lam, extra)
+        _scalings_inplace(faces, x, y, mu, rho, shift, (beta, w, lam), extra, turned)
         mean = total / max(able, 1)
-        if sharing:
-            regular = factorise_faces_inplace(faces, extra, turned, symbolic, U, L, memory)
-        else:
-            regular = factorise_inplace(
-                indptr, indices, data, extra, order, upper_start, upper, lower_start, lower,
-                U, L, inverse, work,
-            )  # fmt: skip
-        if not regular:
+        if not _factorised_inplace(W, faces, extra, turned, symbolic, factor):
             return -1 - count
         sigma = length = 0.0
         for phase in range(2):
             right_side_inplace(phase, sigma, mean, mu, rho, lam, beta, w, dx, dy, residual, rhs)
-            if sharing:
-                step_by_faces_inplace(
-                    (indptr, indices, data), faces, extra, turned, symbolic, U, L, memory, rhs,
-                    dr, du,
-                )  # fmt: skip
-            else:
-                solve_inplace(
-                    order, upper_start, upper, lower_start, lower, U, L, inverse, rhs, dr
-                )
-                velocity_of_rows_inplace(0, len(q), indptr, indices, data, zero, dr, du)
-            if not math.isfinite(np.sum(du)):
+            if not _solved_inplace(W, faces, extra, turned, symbolic, factor, rhs, dr, du):
                 return -1 - count
             changes_inplace(1.0 - sigma, mu, rho, residual, dr, du, dx, dy)
             length = min(room(x, dx, rho), room(y, dy, rho))
