@@ -12,7 +12,8 @@ crawls.  With the Nesterov-Todd scaling D x = y, D = F F, lambda = F x, a step s
     (W + S^-1 D S^-1) dr = S^-1 (F p + R),   p = lambda^-1 o (sigma m e - lambda o lambda - c),
 
 R = y - S u - s e_N the residual, m = x . y / nc, c the corrector: W plus 3x3 blocks again, the
-matrix of `block_lu`.  Then s = |u_T| of the result, and so on [C, AANS]; accelerated sweeps
+matrix of `block_lu`, or by the faces that contacts of rigid bodies share (`faces`,
+`face_steps`).  Then s = |u_T| of the result, and so on [C, AANS]; accelerated sweeps
 from each result often end it at once, as most contacts of a pile stick and s = 0 was right.
 
 A contact with mu = 0 has the half line x_N >= 0 in place of the cone.
