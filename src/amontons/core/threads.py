@@ -132,9 +132,12 @@ def _quota() -> int:
         return MOST
 
 
-def split(rows: int, work: float) -> list[Range]:
-    """Ranges of rows for as many threads as `work`, numbers that are touched, is worth."""
-    count = int(min(work // GRAIN, rows))
+def split(rows: int, work: float, least: int = 1) -> list[Range]:
+    """Ranges of rows for as many threads as `work`, numbers that are touched, is worth.
+
+    least: rows of a range, where there are more ranges than one.
+    """
+    count = int(min(work // GRAIN, rows // least))
     count = min(threads(), count) if count > 1 else 1
     if count <= 1:
         return [(0, rows)]
@@ -144,7 +147,10 @@ def split(rows: int, work: float) -> list[Range]:
 
 def over_rows(kernel: Kernel, rows: int, work: float, *arguments: Any) -> None:
     """kernel(first, last, *arguments) for all of range(rows), in parts."""
-    shared(kernel, split(rows, work), arguments)
+    if work < 2 * GRAIN:  # of small problems the Python around kernels is what takes time
+        kernel(0, rows, *arguments)
+    else:
+        shared(kernel, split(rows, work), arguments)
 
 
 def over_blocks(kernel: Kernel, rows: int, work: float, *arguments: Any) -> None:
@@ -160,12 +166,11 @@ def over_chunks(
     kernel: Kernel, chunks: Sequence[Range], work: float, *arguments: Any
 ) -> None:
     """kernel(first, last, *arguments) for every one of some ranges of rows, in any order."""
-    groups = [chunks[first:last] for first, last in split(len(chunks), work)]
-    if len(groups) == 1 or not chunks:
-        for first, last in chunks:
-            kernel(first, last, *arguments)
-        return
-    _in_threads(kernel, groups, arguments)
+    parts = [] if work < 2 * GRAIN else split(len(chunks), work)
+    if len(parts) > 1:
+        _in_threads(kernel, [chunks[first:last] for first, last in parts], arguments)
+    else:
+        _each(kernel, chunks, arguments)
 
 
 def over_stages(
@@ -179,11 +184,11 @@ def over_stages(
 
     backward: the other way round.
     """
+    if len(chunks) == 1:
+        kernel(*chunks[0], *arguments)
+        return
     for odd in (True, False) if backward else (False, True):
-        some = chunks[odd::2]
-        if some:
-            share = 0.5 * work if len(chunks) > 1 else work
-            over_chunks(kernel, some, share, *arguments)
+        over_chunks(kernel, chunks[odd::2], 0.5 * work, *arguments)
 
 
 def shared(kernel: Kernel, ranges: Sequence[Range], arguments: tuple[Any, ...]) -> None:

@@ -25,25 +25,27 @@ from ..core.threads import Range
 Index = NDArray[np.int64]
 Integers = NDArray[np.integer]
 COUNTS = (64, 32, 16, 8, 4)  # chunks that are tried
+FEW = 8  # chunks of some rows only: little to share, and each takes a call
 LEAST_ENTRIES = 50_000  # blocks of a matrix that is not cut: a sweep takes less than a thread
 LEAST_ROWS = 128  # of a chunk
 
 
 def chunks_of(
-    indptr: Integers, first: Integers, last: Integers, multiple: int = 1
+    indptr: Integers, first: Integers, last: Integers, multiple: int = 1, most: int = COUNTS[0]
 ) -> list[Range]:
     """Chunks of rows whose least and greatest columns are first and last, (n,); one if need be.
 
-    How many depends on the matrix alone.  multiple: all but the last have so many rows, or a
-    multiple of that.
+    How many depends on the matrix alone; they have alike many entries, as threads share them.
+    multiple: all but the last have so many rows, or a multiple of that; most: chunks.
     """
     rows = len(indptr) - 1
     if indptr[-1] < LEAST_ENTRIES:
         return [(0, rows)]
-    for count in COUNTS:
-        length = -(-rows // (count * multiple)) * multiple
-        ends = np.minimum(length * np.arange(count + 1), rows)
-        if rows < LEAST_ROWS * count or ends[-2] == rows:
+    for count in COUNTS[COUNTS.index(most) :]:
+        wanted = np.searchsorted(indptr, indptr[-1] / count * np.arange(1, count))
+        inner = multiple * np.rint(wanted / multiple).astype(np.int64)
+        ends = np.concatenate([[0], inner, [rows]])
+        if np.diff(ends).min() < LEAST_ROWS:
             continue
         low = np.minimum.reduceat(first, ends[:-1])
         high = np.maximum.reduceat(last, ends[:-1])
@@ -59,6 +61,19 @@ def chunks_of_sorted(indptr: Integers, indices: Integers) -> list[Range]:
     if indptr[-1] < LEAST_ENTRIES:
         return [(0, len(indptr) - 1)]
     return chunks_of(indptr, indices[indptr[:-1]], indices[indptr[1:] - 1])
+
+
+def chunks_among(node: Integers, indptr: Integers, indices: Integers) -> list[Range]:
+    """The same for the rows of some nodes (k,), in this order, by couplings among these."""
+    rows = len(node)
+    if indptr[-1] < LEAST_ENTRIES:
+        return [(0, rows)]
+    number = np.full(max(int(node.max()), int(indices.max())) + 1, -1, dtype=np.int64)
+    number[node] = np.arange(rows)
+    own = number[indices]
+    first = np.minimum.reduceat(np.where(own < 0, rows, own), indptr[:-1])
+    last = np.maximum.reduceat(own, indptr[:-1])
+    return chunks_of(indptr, first, last, most=FEW)
 
 
 def better_numbers(indptr: Integers, indices: Integers, width: int = 1) -> Index | None:

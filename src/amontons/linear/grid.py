@@ -14,11 +14,9 @@ from typing import TYPE_CHECKING, ClassVar
 import numpy as np
 from numpy.typing import NDArray
 
-from ..core.compiled import njit
-from ..core.copies import copy_rows_inplace
-from ..core.threads import over_rows
+from ..core.threads import over_rows, shared, split
+from .grid_kernels import product_of_lines, scaled, smoothed_lines
 from .node_blocks import NodeBlocks, block_inverse
-from .work import Work
 
 if TYPE_CHECKING:
     from .transfer import Transfer
@@ -53,7 +51,6 @@ class GridBlocks:
         diagonal = self.stencils[:, :, :, 1, 1, 1].reshape(27, 3, 3)
         self.inverses = block_inverse(diagonal, np.abs(diagonal).max(axis=(1, 2)))
         self._terms = _terms(self.stencils)
-        self._work = Work(self.nodes)
 
     @property
     def shape(self) -> tuple[int, int, int]:
@@ -74,41 +71,46 @@ class GridBlocks:
     # ------------------------------------------------------------------ products
     def times(self, x: Array, out: Array) -> None:
         """out = A x, both (nodes, 3), zero at idle components."""
-        self._pass(x, x, x, out, 0.0, 0.0, 0, self._free)
+        self._product(x, x, out, False)
 
     def residual(self, x: Array, b: Array, out: Array) -> None:
         """out = b - A x."""
-        self._pass(x, b, x, out, 0.0, 0.0, 1, self._free)
+        self._product(x, b, out, True)
 
-    def _pass(self, x, b, d, out, keep, step, mode, held) -> None:  # noqa: PLR0913
-        over_rows(_grid_pass, self._lines, 30.0 * self.nodes, self.shape, *self._terms,
-                  self.stencils, self.inverses, self.used, held, x, b, d, out, keep, step,
-                  mode)  # fmt: skip
+    def _product(self, x: Array, b: Array, out: Array, rest: bool) -> None:
+        over_rows(product_of_lines, self._lines, 30.0 * self.nodes, self.shape, *self._terms,
+                  self.stencils, self.used, x, b, out, rest)  # fmt: skip
 
-    def _scale(self, b: Array, out: Array, same: Array, factor: float) -> None:
-        """out = same = factor D^-1 b at the unknowns."""
-        over_rows(_scaled, self._lines, 10.0 * self.nodes, self.shape, self.inverses, self.used,
-                  b, out, same, factor)  # fmt: skip
-
-    def rest(self) -> None:
-        """Give up the vectors in which this thread works."""
-        self._work.rest()
+    def _scale(self, b: Array, out: Array) -> None:
+        """out = D^-1 b at the unknowns."""
+        over_rows(scaled, self._lines, 10.0 * self.nodes, self.shape, self.inverses, self.used,
+                  b, out)  # fmt: skip
 
     # ------------------------------------------------------------------ smoothing
     def smooth(self, b: Array, x: Array, held: NDArray[np.bool_], backward: bool) -> None:
         """Two Chebyshev steps on A x = b that leave the nodes held as they are."""
-        d, other = self._work.x, self._work.b
-        first, keep, second = self._chebyshev
-        self._pass(x, b, d, other, 0.0, first, 2, held)
-        self._pass(other, b, d, x, keep, second, 2, held)
+        self._smooth(b, x, held, False)
 
     def first_smooth(self, b: Array, x: Array, r: Array) -> None:
         """The same from x = 0, and r = b - A x."""
-        d, other = self._work.x, self._work.b
-        first, keep, second = self._chebyshev
-        self._scale(b, d, other, first)
-        self._pass(other, b, d, x, keep, second, 2, self._free)
+        self._smooth(b, x, self._free, True)
         self.residual(x, b, r)
+
+    def _smooth(self, b: Array, x: Array, held: NDArray[np.bool_], from_zero: bool) -> None:
+        """Both steps in one pass over the vectors, see `smoothed_lines`."""
+        _, ny, nx = self.shape
+        reach = 2 * (ny + 1)  # lines that both steps of a line reach to either side
+        ranges = split(self._lines, 60.0 * self.nodes, least=2 * reach)
+        ends = np.array([first for first, _ in ranges[1:]], dtype=np.int64)
+        saved = np.empty((len(ends), 2 * reach * nx, 3))
+        if not from_zero:
+            for end, lines in zip(ends, saved, strict=True):
+                first, last = max(end - reach, 0), min(end + reach, self._lines)
+                at = (first - end + reach) * nx
+                lines[at : at + (last - first) * nx] = x[first * nx : last * nx]
+        arguments = (self.shape, *self._terms, self.stencils, self.inverses, self.used, held,
+                     x, b, ends, saved, *self._chebyshev, from_zero)  # fmt: skip
+        shared(smoothed_lines, ranges, arguments)
 
     @cached_property
     def _free(self) -> NDArray[np.bool_]:
@@ -136,7 +138,7 @@ class GridBlocks:
         Ax, size = np.empty_like(x), 1.0
         for _ in range(POWER_STEPS):
             self.times(x, Ax)
-            self._scale(Ax, x, x, 1.0)
+            self._scale(Ax, x)
             size = float(np.linalg.norm(x))
             x /= size
         return size
@@ -226,117 +228,3 @@ def _terms(stencils: Array) -> tuple[Array, Index, Index]:
             array[k, : len(values)] = values
     shape = (9, 3, size)
     return tuple(array.reshape(shape) for array in out)  # type: ignore[return-value]
-
-
-@njit(cache=True, error_model="numpy", nogil=True)
-def _scaled(begin, end, shape, inverses, used, b, out, same, factor):  # noqa: PLR0913
-    """out = same = factor D^-1 b at the unknowns of the lines begin to end."""
-    nz, ny, nx = shape
-    node = begin * nx
-    for line in range(begin, end):
-        z, y = line // ny, line % ny
-        cz = 0 if z == 0 else (2 if z == nz - 1 else 1)
-        cy = 0 if y == 0 else (2 if y == ny - 1 else 1)
-        for x in range(nx):
-            cx = 0 if x == 0 else (2 if x == nx - 1 else 1)
-            D = inverses[(cz * 3 + cy) * 3 + cx]
-            b0, b1, b2 = b[node, 0], b[node, 1], b[node, 2]
-            for a in range(3):
-                s = factor * (D[a, 0] * b0 + D[a, 1] * b1 + D[a, 2] * b2) * used[node, a]
-                out[node, a], same[node, a] = s, s
-            node += 1
-
-
-@njit(cache=True, error_model="numpy", fastmath={"contract"})
-def _line(values, lines, shifts, buffer, acc, width):
-    """acc[a, i] = sum of coefficients times shifted lines, inner nodes of one line."""
-    for a in range(3):
-        target = acc[a]
-        target[:] = 0.0
-        for t in range(0, values.shape[1], 4):
-            v0, v1, v2, v3 = values[a, t], values[a, t + 1], values[a, t + 2], values[a, t + 3]
-            o0 = 1 + shifts[a, t]
-            o1 = 1 + shifts[a, t + 1]
-            o2 = 1 + shifts[a, t + 2]
-            o3 = 1 + shifts[a, t + 3]
-            x0 = buffer[lines[a, t], o0 : o0 + width]
-            x1 = buffer[lines[a, t + 1], o1 : o1 + width]
-            x2 = buffer[lines[a, t + 2], o2 : o2 + width]
-            x3 = buffer[lines[a, t + 3], o3 : o3 + width]
-            for i in range(width):
-                target[i] += v0 * x0[i] + v1 * x1[i] + v2 * x2[i] + v3 * x3[i]
-
-
-@njit(cache=True, error_model="numpy")
-def _load(x, node, nx, buffer, line):
-    """One line of nodes by components, with a zero at both ends."""
-    for i in range(nx):
-        for a in range(3):
-            buffer[line * 3 + a, i + 1] = x[node + i, a]
-
-
-@njit(cache=True, error_model="numpy")
-def _end(stencil, buffer, i, a):
-    """Row a of the product at the end i of a line."""
-    s = 0.0
-    for dz in range(3):
-        for dy in range(3):
-            for dx in range(3):
-                for b in range(3):
-                    s += stencil[dz, dy, dx, a, b] * buffer[(3 * dz + dy) * 3 + b, i + dx]
-    return s
-
-
-@njit(cache=True, error_model="numpy", fastmath={"contract"}, nogil=True)
-def _grid_pass(begin, end, shape, values, lines, shifts, stencils, inverses, used, held, x, b,
-               d, out, keep, step, mode):  # noqa: PLR0913 # fmt: skip
-    """One of three operations on the lines begin to end of nodes along x.
-
-    mode 0: out = A x; 1: out = b - A x; 2: d = keep d + step D^-1 (b - A x), out = x + d.
-    """
-    nz, ny, nx = shape
-    buffer = np.zeros((27, nx + 2))
-    acc = np.zeros((3, nx))
-    for line in range(begin, end):
-        z, y = line // ny, line % ny
-        cz = 0 if z == 0 else (2 if z == nz - 1 else 1)
-        cy = 0 if y == 0 else (2 if y == ny - 1 else 1)
-        for dz in range(3):
-            for dy in range(3):
-                l = 3 * dz + dy
-                inside = 0 <= z + dz - 1 < nz and 0 <= y + dy - 1 < ny
-                if not inside:
-                    buffer[3 * l : 3 * l + 3] = 0.0
-                elif dy < 2 and y > 0 and line > begin:  # was the next line of the one before
-                    copy_rows_inplace(buffer[3 * l + 3 : 3 * l + 6], buffer[3 * l : 3 * l + 3])
-                else:
-                    _load(x, ((z + dz - 1) * ny + y + dy - 1) * nx, nx, buffer, l)
-        kind = 3 * cz + cy
-        _line(values[kind], lines[kind], shifts[kind], buffer, acc, nx)
-        for a in range(3):
-            acc[a, 0] = _end(stencils[cz, cy, 0], buffer, 0, a)
-            acc[a, nx - 1] = _end(stencils[cz, cy, 2], buffer, nx - 1, a)
-        node = (z * ny + y) * nx
-        for i in range(nx):
-            p = node + i
-            if mode == 0:
-                for a in range(3):
-                    out[p, a] = acc[a, i] * used[p, a]
-            elif mode == 1:
-                for a in range(3):
-                    out[p, a] = (b[p, a] - acc[a, i]) * used[p, a]
-            elif held[p]:
-                for a in range(3):
-                    d[p, a] = 0.0
-                    out[p, a] = x[p, a]
-            else:
-                cx = 0 if i == 0 else (2 if i == nx - 1 else 1)
-                D = inverses[3 * kind + cx]
-                r0 = (b[p, 0] - acc[0, i]) * used[p, 0]
-                r1 = (b[p, 1] - acc[1, i]) * used[p, 1]
-                r2 = (b[p, 2] - acc[2, i]) * used[p, 2]
-                for a in range(3):
-                    s = D[a, 0] * r0 + D[a, 1] * r1 + D[a, 2] * r2
-                    s = (keep * d[p, a] + step * s) * used[p, a]
-                    d[p, a] = s
-                    out[p, a] = x[p, a] + s

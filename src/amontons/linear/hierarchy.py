@@ -15,12 +15,11 @@ from ..core.errors import SingularOperator
 from .aggregation import LARGEST, Aggregates, separates
 from .chunks import better_numbers
 from .coarsest import inverse_at_rest
-from .grid import GridBlocks
 from .level_matrix import LevelMatrix
 from .node_blocks import NodeBlocks
 from .patched import PatchedBlocks, PatchedOperator, Rows, patched
 from .transfer import Transfer
-from .vectors import advance, dot, norm, turn
+from .vectors import advance, dot, norm, put_at, take_from, turn
 from .work import Work
 
 Array = NDArray[np.float64]
@@ -82,12 +81,16 @@ class Nodes:
         if self.plain:
             return np.array(x, dtype=float).reshape(-1, 3)
         out = np.zeros(3 * self.count)
-        out[self.place] = x
+        put_at(self.place, np.ascontiguousarray(x, dtype=float), out)
         return out.reshape(-1, 3)
 
     def gather(self, x: Array) -> Array:
         """The inverse of `spread`."""
-        return x.reshape(-1).copy() if self.plain else x.reshape(-1)[self.place]
+        if self.plain:
+            return x.reshape(-1).copy()
+        out = np.empty(len(self.place))
+        take_from(self.place, x.reshape(-1), out)
+        return out
 
 
 def components(modes: Array | None, n: int, d: int) -> Index | None:
@@ -247,8 +250,6 @@ class Hierarchy:
         """Give up the vectors in which this thread works; the next cycle makes them anew."""
         for level in self.levels:
             level.work.rest()
-            if isinstance(level.A, GridBlocks):
-                level.A.rest()
 
     def solve(self, k: int, b: Array, tolerance: float, most: int) -> tuple[Array, int]:
         """(x, iterations) of CG on level k for A x = b with one cycle as preconditioner.

@@ -16,24 +16,21 @@ from ..core.compiled import njit
 from ..core.threads import over_rows, over_stages
 from .level_matrix import LevelMatrix
 from .node_blocks import NodeBlocks, row_product, row_product_back
-from .some_rows import relax, residual_rows, sweep_rows
+from .some_rows import Pattern, relax
 
 Array = NDArray[np.float64]
 Index = NDArray[np.int64]
 
 
 @dataclass(frozen=True, eq=False)
-class Rows:
-    """Some rows of a matrix: node (k,) ascending, and slots (e,): their entries in its data.
+class Rows(Pattern):
+    """Some rows of a matrix, nodes ascending, and slots (e,): their entries in its data.
 
-    number (nodes,): place of a node among them, -1 for others; indptr (k + 1,), indices (e,).
+    number (nodes,): place of a node among them, -1 for others.
     """
 
-    node: Index
     number: NDArray[np.int32]
     slots: Index
-    indptr: NDArray[np.int32]
-    indices: NDArray[np.int32]
 
     @classmethod
     def of(cls, A: NodeBlocks, node: Index) -> Rows:
@@ -41,7 +38,7 @@ class Rows:
         number = np.full(A.nodes, -1, dtype=np.int32)
         number[node] = np.arange(len(node))
         slots, ends = A.slots(node)
-        return cls(node, number, slots, ends.astype(np.int32), A.indices[slots])
+        return cls(node, ends.astype(np.int32), A.indices[slots], number, slots)
 
 
 @dataclass(eq=False)
@@ -117,13 +114,12 @@ class PatchedOperator:
 
     def smooth(self, b: Array, x: Array, held: NDArray[np.bool_], backward: bool) -> None:
         """One sweep on A x = b over the nodes that are not held; backward: own rows first."""
-        own = self.rows
-        rows = own.node, own.indptr, own.indices, self.data, self.inverse, b, x, held, backward
+        own = self.data, self.inverse, b, x, held, backward
         if backward:
-            sweep_rows(*rows)
+            self.rows.sweep(*own)
         self.base.smooth(b, x, self.own | held, backward)
         if not backward:
-            sweep_rows(*rows)
+            self.rows.sweep(*own)
 
     def first_smooth(self, b: Array, x: Array, r: Array) -> None:
         """The same forwards from x = 0, and r = b - A x."""
@@ -134,8 +130,7 @@ class PatchedOperator:
     def residual(self, x: Array, b: Array, out: Array) -> None:
         """out = b - A x."""
         self.base.residual(x, b, out)
-        own = self.rows
-        residual_rows(own.node, own.indptr, own.indices, self.data, x, b, out)
+        self.rows.evaluate(self.data, x, b, out)
 
     def stored(self) -> NodeBlocks:
         """The whole matrix."""

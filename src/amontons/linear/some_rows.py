@@ -3,12 +3,15 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 from numba import uint64
 from numpy.typing import NDArray
 
 from ..core.compiled import njit
+from ..core.threads import Range, over_rows, over_stages
+from .chunks import chunks_among
 from .level_matrix import LevelMatrix
 from .node_blocks import row_product, row_product_back
 
@@ -17,15 +20,43 @@ Index = NDArray[np.int64]
 
 
 @dataclass(frozen=True, eq=False)
-class SomeRows:
-    """Rows of nodes (k,) in ascending order: indptr (k + 1,), indices (e,), data (e, 3, 3).
-
-    inverse (k, 3, 3): of the diagonal blocks.
-    """
+class Pattern:
+    """Rows of nodes (k,), and where their entries are: indptr (k + 1,), indices (e,)."""
 
     node: Index
     indptr: NDArray[np.int32]
     indices: NDArray[np.int32]
+
+    @cached_property
+    def chunks(self) -> list[Range]:
+        """Ranges of these rows, every second of which is swept at once."""
+        return chunks_among(self.node, self.indptr, self.indices)
+
+    def sweep(  # noqa: PLR0913
+        self, data: Array, inverse: Array, b: Array, x: Array, held: NDArray[np.bool_],
+        backward: bool,
+    ) -> None:  # fmt: skip
+        """A block Gauss-Seidel sweep on A x = b over those of the nodes that are not held.
+
+        data (e, 3, 3): blocks of A; inverse (k, 3, 3): of the diagonal ones.
+        """
+        over_stages(sweep_rows, self.chunks, 10.0 * len(data), self.node, self.indptr,
+                    self.indices, data, inverse, b, x, held, backward,
+                    backward=backward)  # fmt: skip
+
+    def evaluate(self, data: Array, x: Array, b: Array, out: Array) -> None:
+        """out = b - A x in these rows."""
+        over_rows(residual_rows, len(self.node), 10.0 * len(data), self.node, self.indptr,
+                  self.indices, data, x, b, out)  # fmt: skip
+
+
+@dataclass(frozen=True, eq=False)
+class SomeRows(Pattern):
+    """Rows of nodes (k,) in ascending order with their blocks, data (e, 3, 3).
+
+    inverse (k, 3, 3): of the diagonal blocks.
+    """
+
     data: Array
     inverse: Array
 
@@ -37,12 +68,11 @@ class SomeRows:
 
     def smooth(self, b: Array, x: Array, held: NDArray[np.bool_], backward: bool) -> None:
         """A block Gauss-Seidel sweep on A x = b over those of the nodes that are not held."""
-        sweep_rows(self.node, self.indptr, self.indices, self.data, self.inverse, b, x, held,
-                   backward)  # fmt: skip
+        self.sweep(self.data, self.inverse, b, x, held, backward)
 
     def residual(self, x: Array, b: Array, out: Array) -> None:
         """out = b - A x in these rows."""
-        residual_rows(self.node, self.indptr, self.indices, self.data, x, b, out)
+        self.evaluate(self.data, x, b, out)
 
 
 @njit(cache=True, error_model="numpy", inline="always")
@@ -55,10 +85,10 @@ def relax(D, b, s, x, i):
 
 
 @njit(cache=True, error_model="numpy", nogil=True)
-def sweep_rows(node, indptr, indices, data, inverse, b, x, held, backward):  # noqa: PLR0913
-    """A block Gauss-Seidel sweep over the nodes of some rows that are not held."""
-    for step in range(len(node)):
-        k = len(node) - 1 - step if backward else step
+def sweep_rows(begin, end, node, indptr, indices, data, inverse, b, x, held, backward):  # noqa: PLR0913
+    """A block Gauss-Seidel sweep over the nodes of a chunk of rows that are not held."""
+    for step in range(end - begin):
+        k = end - 1 - step if backward else begin + step
         i = uint64(node[k])
         if not held[i]:
             first, last = uint64(indptr[k]), uint64(indptr[k + 1])
@@ -70,9 +100,9 @@ def sweep_rows(node, indptr, indices, data, inverse, b, x, held, backward):  # n
 
 
 @njit(cache=True, error_model="numpy", nogil=True)
-def residual_rows(node, indptr, indices, data, x, b, r):  # noqa: PLR0913
+def residual_rows(begin, end, node, indptr, indices, data, x, b, r):  # noqa: PLR0913
     """r = b - A x in some rows."""
-    for k in range(len(node)):
+    for k in range(begin, end):
         i = uint64(node[k])
         s = row_product(indices, data, x, uint64(indptr[k]), uint64(indptr[k + 1]))
         r[i, 0], r[i, 1], r[i, 2] = b[i, 0] - s[0], b[i, 1] - s[1], b[i, 2] - s[2]

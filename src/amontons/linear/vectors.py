@@ -6,12 +6,14 @@ Arrays of any shape are taken flat; they have to be contiguous.
 from __future__ import annotations
 
 import numpy as np
+from numba import uint64
 from numpy.typing import NDArray
 
 from ..core.compiled import njit
-from ..core.threads import BLOCK, over_blocks
+from ..core.threads import BLOCK, over_blocks, over_rows
 
 Array = NDArray[np.float64]
+Index = NDArray[np.int64]
 
 
 def blocks_of(size: int) -> int:
@@ -54,6 +56,16 @@ def advance(x: Array, r: Array, step: float, p: Array, Ap: Array) -> float:
     return float(np.sqrt(np.add.reduce(sums)))
 
 
+def put_at(place: Index, x: Array, out: Array) -> None:
+    """out[place] = x, all flat; no place twice."""
+    over_rows(_put_at, len(place), 3.0 * len(place), place, x, out)
+
+
+def take_from(place: Index, x: Array, out: Array) -> None:
+    """out = x[place], all flat."""
+    over_rows(_take_from, len(place), 3.0 * len(place), place, x, out)
+
+
 @njit(cache=True, error_model="numpy", fastmath={"contract", "reassoc"}, nogil=True)
 def _dot(begin, end, a, b, sums):
     for first in range(begin, end, BLOCK):
@@ -91,3 +103,15 @@ def _advance(begin, end, x, r, p, Ap, step, sums):  # noqa: PLR0913
             r[i] = s
             total += s * s
         sums[first // BLOCK] = total
+
+
+@njit(cache=True, nogil=True)
+def _put_at(begin, end, place, x, out):
+    for i in range(begin, end):
+        out[uint64(place[i])] = x[i]
+
+
+@njit(cache=True, nogil=True)
+def _take_from(begin, end, place, x, out):
+    for i in range(begin, end):
+        out[i] = x[uint64(place[i])]

@@ -67,7 +67,7 @@ def negative_direction(problem: Equations) -> NegativeDirection | None:
     """
     if problem.measure is Measure.EXACT:
         local = problem.condensed()
-        found = negative_contact(local) or _of_whole(local)
+        found = local.kept(negative_contact) or local.kept(_of_whole)
         if found is not None or not problem.has_v:
             return found
     M = problem.M
@@ -163,8 +163,10 @@ def _found(name: str, A: Matrix, owner: NDArray) -> NegativeDirection | None:
     if not m:
         return None
 
+    symmetric = (A + A.T) * 0.5  # once: a product with A.T takes longer than one with A
+
     def product(x: Array) -> Array:
-        return 0.5 * (A @ x + A.T @ x)
+        return symmetric @ x
 
     vectors, diagonal, beside = _lanczos(product, m, min(STEPS, m))
     values, parts = eigh_tridiagonal(diagonal, beside)
@@ -181,19 +183,18 @@ def _found(name: str, A: Matrix, owner: NDArray) -> NegativeDirection | None:
 
 def _lanczos(product, m: int, steps: int) -> tuple[Array, Array, Array]:
     """Orthonormal vectors (k, m) and the tridiagonal matrix (k,), (k-1,) of the operator."""
-    vectors, diagonal, beside = [], [], []
+    vectors, diagonal, beside = np.empty((steps, m)), [], []
     v = np.random.default_rng(SEED).standard_normal(m)
     v /= np.linalg.norm(v)
-    for _ in range(steps):
-        vectors.append(v)
-        w = product(v)
+    for k in range(steps):
+        vectors[k] = v
+        w, known = product(v), vectors[: k + 1]
         diagonal.append(float(v @ w))
-        known = np.array(vectors)
         for _ in range(2):  # orthogonal to all, as rounding is not
             w = w - known.T @ (known @ w)
         length = float(np.linalg.norm(w))
-        if length <= 1e-12 * max(map(abs, diagonal)) or len(vectors) == steps:
+        if length <= 1e-12 * max(map(abs, diagonal)) or k + 1 == steps:
             break
         beside.append(length)
         v = w / length
-    return np.array(vectors), np.array(diagonal), np.array(beside)
+    return vectors[: len(diagonal)], np.array(diagonal), np.array(beside)

@@ -19,8 +19,8 @@ PACKAGE = Path(amontons.__file__).parent
 CALL = """
 import numpy as np
 from amontons.core import compiled
-from amontons.solvers.sweeps.kernels import _dot
-_dot(np.ones(2, np.float32), np.ones(2, np.float32))  # never comes with the package
+from amontons.core.copies import copy_inplace
+copy_inplace(np.ones(2, np.float32), np.ones(2, np.float32))  # never comes with the package
 print(compiled._folder())
 """
 

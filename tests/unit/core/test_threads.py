@@ -22,6 +22,7 @@ from amontons.mechanics.elements import slabs
 from amontons.mechanics.elements.elasticity import stiffness as stiffness_of
 from amontons.mechanics.model import assembly
 from amontons.solvers.driver import drive
+from amontons.solvers.multigrid.levels import ContactLevels
 from amontons.solvers.sweeps.kernels import Acceleration, SweepOrder, sweep_data, watch_for
 
 COUNTS = (1, 2, 3, 5)
@@ -195,6 +196,36 @@ def test_sweeps_in_chunks_are_gauss_seidel():
     )
 
 
+@pytest.mark.parametrize("shape", [(4, 3, 40), (1, 1, 30), (2, 9, 3)])
+def test_smoothing_of_a_box_is_chebyshev(shape):
+    """Both steps by definition; in one pass, and in parts that change x beside each other."""
+    A, stored = stiffness(shape)
+    matrix, D = stored.dense(), A.inverses.reshape(3, 3, 3, 3, 3)[A.classes(range(A.nodes))]
+    rng = np.random.default_rng(0)
+    b, x = (rng.standard_normal((A.nodes, 3)) * A.used for _ in range(2))
+    held, none = rng.random(A.nodes) < 0.2, np.zeros(A.nodes, dtype=bool)
+    first, keep, second = A._chebyshev
+
+    def smoothed(x, held):
+        d = np.zeros_like(x)
+        for kept, step in ((0.0, first), (keep, second)):
+            rest = np.einsum("kab,kb->ka", D, (b.ravel() - matrix @ x.ravel()).reshape(-1, 3))
+            d = (kept * d + step * rest) * (~held)[:, None] * A.used
+            x = x + d
+        return x
+
+    def run():
+        y, z, r = x.copy(), np.full_like(x, 7.0), np.empty_like(x)
+        A.smooth(b, y, held, False)
+        A.first_smooth(b, z, r)
+        return y, z
+
+    found = same(run)
+    expected = smoothed(x, held), smoothed(np.zeros_like(x), none)
+    for a, e in zip(found, expected, strict=True):
+        np.testing.assert_allclose(a, e, rtol=0, atol=1e-12 * np.abs(e).max())
+
+
 def test_other_numbers_of_nodes():
     """A shuffled matrix gets numbers with chunks; the matrix under them is the same."""
     _, A = stiffness((5, 4, 40))
@@ -258,7 +289,10 @@ def test_stiffness(kind, monkeypatch):
 def test_contact_multigrid(kind, monkeypatch):
     monkeypatch.setattr(assembly, "GRID_FROM", 1 if kind == "operator" else 1e12)
     monkeypatch.setattr(grid, "UNSTORED_FROM", 100)
+    monkeypatch.setattr(chunks, "LEAST_ENTRIES", 500)
     problem = cube(8).assemble()
+    contacts = ContactLevels.of(problem).contacts
+    assert len(contacts.chunks) == len(contacts.near.chunks) == 4
     if kind == "aggregates":
         problem = replace(problem.fresh(), levels=(), guess=None)
 

@@ -27,7 +27,6 @@ from numpy.typing import NDArray
 
 from ...core.errors import SingularOperator
 from ...linear.blocks import spatial
-from ...linear.some_rows import residual_rows
 from ...linear.vectors import norm
 from ...problem.law.law import TRESCA
 from ...problem.law.states import ContactStatus
@@ -225,7 +224,7 @@ class _Cycle:
         """A step of block Jacobi at the contact nodes."""
         node, own = self.node, z[self.node].copy()
         z[node] = np.einsum("cab,cb->ca", self.trial, own)
-        residual_rows(node, *self.contacts.rows, z, self.nothing, self.work)  # - M z
+        self.contacts.own_residual(self.nothing, z, self.work)  # - M z
         rest = b[node] + np.einsum("cab,ca->cb", self.test, self.work[node])
         rest -= np.einsum("cab,cb->ca", self.L, own)
         z[node] = own + JACOBI * np.einsum("cab,cb->ca", self.inverse, rest)

@@ -164,8 +164,9 @@ class MortarMeeting:
 
     @cached_property
     def normals(self) -> Array:
-        """n, (nc, d)."""
-        return self.sums / np.linalg.norm(self.sums, axis=1)[:, None]
+        """n, (nc, d); zero where all facets around have shrunk to points."""
+        size = np.linalg.norm(self.sums, axis=1)[:, None]
+        return self.sums / np.where(size > 0, size, 1.0)
 
     # ---------------------------------------------------------------- averages
     @cached_property

@@ -235,11 +235,12 @@ def candidates(slave: Skin, master: Skin, x: Array) -> tuple[Index, Index]:
 
 
 def shapes(side: Skin, x: Array) -> tuple[Array, Array, Array]:
-    """Centres, unit normals (f, d) and radii (f,) of facets."""
+    """Centres, unit normals (f, d) and radii (f,) of facets; no normal of a mere point."""
     p, real = x[side.nodes], side.real[:, :, None]
     centre = (p * real).sum(axis=1) / side.corners[:, None]
     normal = side.areas(x)
-    normal = normal / np.linalg.norm(normal, axis=1)[:, None]
+    size = np.linalg.norm(normal, axis=1)[:, None]
+    normal = normal / np.where(size > 0, size, 1.0)
     return centre, normal, np.linalg.norm(p - centre[:, None], axis=2).max(axis=1)
 
 

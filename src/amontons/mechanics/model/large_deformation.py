@@ -10,9 +10,7 @@ at its node.  The displacements v of the free dofs are all the unknowns of
 which is continuous and piecewise smooth; all its entries are forces.  Friction speaks of the
 motion since `before`, the displacements at the end of the last step: [LR] section 3.
 With two bodies that deform (1) has the forces of contacts on other nodes, see `moved_pairs`.
-`linearised` is the tangent problem at a state, a `FrictionProblem` with the same reactions,
-gaps and slips there, so that statuses, files and pictures need nothing else.
-
+`linearised`, the tangent problem at a state, is all that statuses, files and pictures need.
 Left out: friction on components of a contact's motion that supports hold.
 
 [LR] T. Ligurský, Y. Renard, "A continuation problem for computing solutions of discretised
@@ -41,6 +39,7 @@ from ...solvers.newton.states import PlainStates
 from ..contact.current import STICK, ContactPoint, Pieces
 from ..contact.current_pairs import Meetings
 from ..elements.linear_body import LinearBody
+from .held_parts import HeldParts
 from .moved_pairs import PairLinearisation, balanced, balanced_law
 from .nodal_forces import NodalForces, nodal_forces
 from .nonlinear_parts import NonlinearParts, nonlinear_parts
@@ -83,7 +82,6 @@ class LargeDeformation(NonlinearProblem):
     def __post_init__(self) -> None:
         object.__setattr__(self, "load", NodalForces.of(self.load))
 
-    # ---------------------------------------------------------------- sizes
     measure = Measure.RESIDUAL
 
     @property
@@ -135,8 +133,8 @@ class LargeDeformation(NonlinearProblem):
     def _meeting(self, u: Array) -> tuple[Array, Meetings]:
         """Motions of the contacts since the last step, (nc, d), and where they meet now."""
         meeting = self.parts.meet(u)
-        motion = meeting.motion(u, self.before.reshape(u.shape), self.earlier)
-        return motion + self.drift, meeting
+        before = self.before.reshape(u.shape), self.earlier
+        return meeting.motion(u, *before) + self.drift, meeting
 
     def _balanced(self, u: Array, meeting: Meetings) -> Array:
         """f_int - f, balanced (dofs,), at displacements u (nodes, d); the last one is kept."""
@@ -298,9 +296,12 @@ class LargeDeformation(NonlinearProblem):
 
     def states(self, v: Array, known: Any = None) -> PlainStates | PressureStates:
         """What Newton's method moves: v alone, or with the pressures of hybrid cells."""
-        if not any(self.parts.keeps_volume):
-            return PlainStates(self, v)
-        return PressureStates(self, v, known)
+        keeps_volume = any(self.parts.keeps_volume)
+        return PressureStates(self, v, known) if keeps_volume else PlainStates(self, v)
+
+    def held(self, v: Array, firmness: float) -> LargeDeformation:
+        """The problem with springs of `held_parts`, relaxed at a state."""
+        return replace(self, parts=HeldParts.of(self.parts, firmness, self.displacement(v)))
 
     def at_share(self, share: float) -> LargeDeformation:
         """The problem at a share of the way from the known load to this one."""
@@ -324,8 +325,8 @@ class LargeDeformation(NonlinearProblem):
         now, then = self.at_share(share), self.at_share(goal)
         tangent, u = now.linearised(v), now.displacement(v)
         moved = then.prescribed - now.prescribed
-        blocks = now._needed_slopes(u)[1]
-        force = (then.load - now.load).at(u) - self.parts.matrix(blocks) @ moved
+        force = (then.load - now.load).at(u)
+        force -= self.parts.matrix(now._needed_slopes(u)[1]) @ moved
         meeting, w = self.parts.meet(u), np.array(tangent.w)
         w[:, 0] += (meeting.normals * meeting.relative(moved.reshape(u.shape))).sum(axis=1)
         force, modes = force[self.parts.free], free_modes(self.parts, u)
@@ -343,7 +344,6 @@ class LargeDeformation(NonlinearProblem):
         return [np.where(loose & (point.meeting.gap <= limit), STICK, point.pieces)
                 for limit in (TOUCHING * size, np.inf)]  # fmt: skip
 
-    # ---------------------------------------------------------------- results
     def recover(self, r: Array, v: Array | None = None) -> tuple[Problem, Array, Array]:
         """A solution is one of the tangent problem at its state unless cells are inverted."""
         u, v = self.motion(r, v)

@@ -243,6 +243,11 @@ class NonlinearParts:
             self._keep(u, forces)
         return forces, np.concatenate([b for _, b in both])
 
+    @cached_property
+    def at_rest(self) -> Array:
+        """Node blocks (m, d, d) of the stiffness of bodies at rest."""
+        return self.tangent(np.zeros_like(self.X))[1]
+
     def energy(self, u: Array) -> float:
         """Stored energy at displacements u (nodes, d)."""
         parts = zip(self.bodies, np.split(u, self.ends), strict=True)

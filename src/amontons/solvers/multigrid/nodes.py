@@ -33,26 +33,26 @@ from functools import cached_property
 from typing import Any
 
 import numpy as np
-from numba import uint64
 from numpy.typing import NDArray
 
 from ...core.compiled import njit
+from ...core.threads import Range, over_rows, over_stages
+from ...linear.chunks import chunks_among
 from ...linear.hierarchy import Nodes
 from ...linear.level_matrix import LevelMatrix
-from ...linear.node_blocks import row_product
 from ...linear.some_rows import SomeRows, residual_rows
 from ...problem.judge.measures import contact_residual
 from ...problem.law import Kind, Law, Tied, Tresca
-from ...problem.law.law import BOUND, MU, TRESCA, columns_of, given
+from ...problem.law.law import BOUND, MU, columns_of, given
 from ...problem.law.mixed import of_kinds
-from ...problem.law.single import solve_contact
 from ...problem.law.states import OPEN, SLIP, STICK
 from ...problem.one_sided import HELD, OneSided
 from ..driven import moves
+from .visits import CLOSED, sweep_contacts
 
 Array = NDArray[np.float64]
 Index = NDArray[np.int64]
-CLOSED = 3  # is added to the status of the tangential motion: a state is from 0 to 5
+CONTACT_WORK = 150.0  # of the solution of a contact, in numbers that a sweep touches
 HALVINGS = 10  # of the interval of a step length
 STIFF = 1e3  # L stays below this multiple of the node's own stiffness
 
@@ -63,8 +63,8 @@ class ContactNodes:
 
     inverse, compliance, to_reaction (nc, 3, 3): A_pp^-1, H^T A_pp^-1 H and H^-1; rho (nc,): of
     the judge; rows: indptr, columns and blocks of their rows of the matrix; near: those of the
-    nodes that they touch.  State of the iteration: r, u (nc, 3), and state (nc,) of the last
-    local solves.
+    nodes that they touch; chunks of contacts, which threads share.  State of the iteration:
+    r, u (nc, 3), and state (nc,) of the last local solves.
     """
 
     node: Index
@@ -75,6 +75,7 @@ class ContactNodes:
     rho: Array
     rows: tuple[NDArray[np.int32], NDArray[np.int32], Array]
     near: SomeRows
+    chunks: list[Range]
     w: Array = field(default_factory=lambda: np.zeros((0, 3)))
     law: Law = field(default_factory=lambda: Tresca(np.zeros(0)))
     driven: NDArray[np.bool_] = field(default_factory=lambda: np.zeros((0, 3), dtype=bool))
@@ -98,7 +99,8 @@ class ContactNodes:
         back: Any = np.linalg.pinv(H)
         near = SomeRows.of(A, np.setdiff1d(rows.indices, node).astype(np.int64))
         return cls(node, H, inverse, compliance, back, 1 / size,
-                   (rows.indptr, rows.indices, rows.data), near)  # fmt: skip
+                   (rows.indptr, rows.indices, rows.data), near,
+                   chunks_among(node, rows.indptr, rows.indices))  # fmt: skip
 
     def at(self, chosen: NDArray[np.bool_], node: Index, A: LevelMatrix) -> ContactNodes:
         """Some of the contacts at nodes (k,) of another level."""
@@ -131,10 +133,11 @@ class ContactNodes:
 
     def sweep(self, f: Array, x: Array, backward: bool = False) -> None:
         """Solve every contact once in turn; r, u and state are those of these solves."""
-        _sweep(
-            *self.rows, self.node, self.H, self.inverse, self.compliance,
-            self.w, self.law.kind, self.law.parameters, f, x, self.r, self.u, self.state,
-            backward,
+        work = 10.0 * len(self.rows[1]) + CONTACT_WORK * len(self.node)
+        over_stages(
+            sweep_contacts, self.chunks, work, *self.rows, self.node, self.H, self.inverse,
+            self.compliance, self.w, self.law.kind, self.law.parameters, f, x, self.r, self.u,
+            self.state, backward, backward=backward,
         )  # fmt: skip
 
     def relax(self, f: Array, x: Array, held: NDArray[np.bool_], backward: bool) -> None:
@@ -150,8 +153,13 @@ class ContactNodes:
 
     def residual(self, f: Array, x: Array, out: Array) -> None:
         """out = f - A x in all rows that a sweep over the contacts changes."""
-        residual_rows(self.node, *self.rows, x, f, out)
+        self.own_residual(f, x, out)
         self.near.residual(x, f, out)
+
+    def own_residual(self, f: Array, x: Array, out: Array) -> None:
+        """The same in their own rows."""
+        work = 10.0 * len(self.rows[1])
+        over_rows(residual_rows, len(self.node), work, self.node, *self.rows, x, f, out)
 
     def natural_map(self, x: Array, residual: Array) -> float:
         """|natural map / rho|, unit of u, with r from the residual f - A x of the nodes.
@@ -227,48 +235,6 @@ class ContactNodes:
         """The rows of contacts become W^T of (law's force - force), in place."""
         _combine(self.node, self.H, self.law.kind, self.law.parameters, self.r, self.u,
                  self.state, W, residual)  # fmt: skip
-
-
-@njit(cache=True, error_model="numpy")
-def _sweep(indptr, indices, data, node, H, inverse, compliance, w, kind, parameters,
-           f, x, r, u, state, backward):  # noqa: PLR0913 # fmt: skip
-    y, b = np.empty(3), np.empty(3)
-    for step in range(len(node)):
-        c = len(node) - 1 - step if backward else step
-        p = node[c]
-        s0, s1, s2 = row_product(indices, data, x, uint64(indptr[c]), uint64(indptr[c + 1]))
-        g0, g1, g2 = f[p, 0] - s0, f[p, 1] - s1, f[p, 2] - s2
-        for i in range(3):
-            y[i] = x[p, i] + (
-                inverse[c, i, 0] * g0 + inverse[c, i, 1] * g1 + inverse[c, i, 2] * g2
-            )
-        for i in range(3):
-            b[i] = w[c, i] + H[c, 0, i] * y[0] + H[c, 1, i] * y[1] + H[c, 2, i] * y[2]
-        r0, r1, r2, status = solve_contact(
-            compliance[c], b[0], b[1], b[2], kind[c], parameters[c], r[c, 1], r[c, 2]
-        )
-        state[c] = _code(status, r1, r2, kind[c], parameters[c, BOUND])
-        r[c, 0], r[c, 1], r[c, 2] = r0, r1, r2
-        g0 = H[c, 0, 0] * r0 + H[c, 0, 1] * r1 + H[c, 0, 2] * r2
-        g1 = H[c, 1, 0] * r0 + H[c, 1, 1] * r1 + H[c, 1, 2] * r2
-        g2 = H[c, 2, 0] * r0 + H[c, 2, 1] * r1 + H[c, 2, 2] * r2
-        for i in range(3):
-            x[p, i] = y[i] + (
-                inverse[c, i, 0] * g0 + inverse[c, i, 1] * g1 + inverse[c, i, 2] * g2
-            )
-            u[c, i] = b[i] + (
-                compliance[c, i, 0] * r0 + compliance[c, i, 1] * r1 + compliance[c, i, 2] * r2
-            )
-
-
-@njit(cache=True, error_model="numpy")
-def _code(status, r1, r2, kind, bound):
-    """The state as one number."""
-    if status != OPEN:
-        return CLOSED + status
-    if kind != TRESCA or bound == 0.0:
-        return OPEN
-    return SLIP if r1 * r1 + r2 * r2 >= 0.999999 * bound * bound else STICK
 
 
 @njit(cache=True, error_model="numpy")

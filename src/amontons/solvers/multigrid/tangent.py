@@ -45,7 +45,7 @@ class Tangent:
         number = np.full(truncation.hierarchy.levels[k].A.nodes, -1, dtype=np.int32)
         number[contacts.node] = np.arange(count)
         self.row, self.column = number[near.row], number[near.column]
-        self.change, self.inverse = np.zeros_like(near.base), None
+        self.change, self.inverse = np.zeros(near.base.shape), None
         one = np.tile(np.eye(3), (count, 1, 1))
         self.parts = one, one.copy(), np.zeros_like(one)
 
@@ -93,7 +93,7 @@ class Tangent:
             product.add(self._sum(j), self.halves[j], sums)
             self._mask(near, sums)
             if j + 1 not in self.below:
-                self.below[j + 1] = np.zeros_like(near.base)
+                self.below[j + 1] = np.zeros(near.base.shape)
             _add(sums.found, sums.blocks, self.below[j + 1])
             self._put(j + 1, sums.found)
         if self.k < last:

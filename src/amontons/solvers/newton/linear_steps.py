@@ -17,6 +17,7 @@ Sci. Comput. 17 (1996).
 from __future__ import annotations
 
 from collections.abc import Sequence
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
@@ -28,6 +29,9 @@ from ...linear.base import Factor
 from ...linear.condensed import Condensed, CondensedFactor, Structure
 from ...linear.small import factor_of_small
 from .states import Linear
+
+if TYPE_CHECKING:
+    from .nonlinear import NonlinearProblem
 
 Array = NDArray[np.float64]
 LARGE = {2: 100_000, 3: 8_000}  # unknowns from which multigrid is cheaper, by dimension
@@ -88,3 +92,19 @@ class LinearSteps:
         x = factor.solved(-F, tolerance)
         self._kept, self._usual = factor, factor.iterations
         return x, factor
+
+
+def newton_step(
+    problem: NonlinearProblem, v: Array, here: Linear, F: Array, linear: LinearSteps,
+    tolerance: float = LOOSEST,
+) -> tuple[Array, Factor]:  # fmt: skip
+    """-dF/dv^-1 F and the factors; with more contacts closed where a body is loose."""
+    try:
+        return linear.solved(here, F, tolerance)
+    except SingularOperator:
+        for pieces in problem.closed_pieces(v):
+            try:
+                return linear.solved(problem.linearisation(v, pieces), F, tolerance)
+            except SingularOperator:
+                continue
+        raise

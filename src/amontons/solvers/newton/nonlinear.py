@@ -2,64 +2,37 @@
 
 The problem is F(v) = 0, piecewise smooth, with a linearisation at every admissible state; see
 `model.large_deformation`.  It is tried at full load at once; where that fails the load grows in
-steps from a state that is known, each begun by a tangent predictor,
-
-    dF/dv dv = -(F(v) + dF/dload dload),
-
-which also moves the prescribed displacements: cells would be inverted by moving these alone.
-Another predictor is the solution of the tangent problem with contact: contacts that change
-find their statuses together, where Newton's steps change them ring by ring, the more steps the
-more contacts.  It comes first between bodies that slide, of LARGE ones by some cycles of
-contact multigrid, and where cells can be inverted, as nothing else keeps such bodies from
-passing through obstacles.  Where Newton's method fails from one predictor the next is tried.
-
-Line search: halving until |F| falls below the largest of the last few values; states with
-inverted cells are never accepted.  Where problems say so by `shortest`, it halves until the
-step that the same matrix asks for at the new state is shorter: the natural monotonicity test of
-[D], which does not change with the units of rows, while |F| hears most of the stiffest nodes.
-
-[D] P. Deuflhard, "Newton methods for nonlinear problems", Springer (2004), section 3.3.
+steps from a state that is known, each begun by one of `predictors`: where Newton's method fails
+from one the next is tried.  `step_lengths` says how far steps go.  Where two bodies slide, and
+no part of a step passes the test, bodies creep on (`creeping`), if a state under load is known
+from which they come: from rest a smaller load says more.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Iterator
+from dataclasses import dataclass
 from typing import Any, ClassVar, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
 
-from ...core.errors import InvertedCells, SingularOperator, UnsupportedForm
+from ...core.errors import InvertedCells, SingularOperator
 from ...core.options import check_options
 from ...linear import LinearSolver
-from ...linear.base import Factor
 from ...problem.friction import FrictionProblem
 from ...problem.protocol import Problem
-from ..contract import (
-    Breakdown,
-    Iterate,
-    Judgement,
-    Patience,
-    Target,
-    check_at_least,
-    check_positive,
-)
-from ..judging import EARLY, first_of, sent
-from .linear_steps import LARGE, LOOSEST, LinearSteps, forcing
+from ..contract import Breakdown, Iterate, Patience, Target, check_at_least, check_positive
+from .creeping import creeping
+from .linear_steps import LinearSteps, forcing, newton_step
+from .predictors import predictors
 from .states import Linear, PlainStates, States
+from .step_lengths import Failed, by_natural_test, by_residual
 
 Array = NDArray[np.float64]
-MEMORY = 5  # values of |F| of which the largest counts in the line search
-ENOUGH = 1e-4  # least relative decrease of |F| over a full step
-NATURAL = 0.25  # least relative decrease of the next step over a full step, natural test
 LOOSE = 1e-5  # error, unit-free, at which a load step is good enough to go on
 REPEATED = 1e-12  # relative difference of |F| below which steps go round in circles
 JUMP = "; if the body jumps there, crossing=PathCrossing() of this solver follows it"
-STATUSES = 1e-8  # error of a tangent problem with contact
-CONTACT_STEPS = 300  # iterates in which it has to be reached
-ROUGH = 1e-4  # the same where cycles solve it: what the tangent leaves out is more
-CYCLES = 30  # most of them
 EASY = 8  # Newton steps up to which the next load step may be longer
 
 
@@ -107,6 +80,10 @@ class NonlinearProblem(Problem):
 
     def closed_pieces(self, v: Array) -> list[Any]:
         """Pieces with ever more contacts closed, for states at which nothing holds a body."""
+        ...
+
+    def held(self, v: Array, firmness: float) -> NonlinearProblem:
+        """The problem with a part of the stiffness at rest as springs relaxed at a state."""
         ...
 
     @property
@@ -158,7 +135,7 @@ class NonlinearNewton:
             try:
                 states = problem.states(start.v)
                 yield from shown.best(self._newton(problem, states, target, linear))
-            except (_Failed, InvertedCells):
+            except (Failed, InvertedCells):
                 pass  # the start was no help
         share, step, reason = 0.0, 1.0, ""
         v = problem.known_state
@@ -174,115 +151,36 @@ class NonlinearNewton:
                 raise Breakdown(
                     f"no equilibrium found beyond {share:.4g} of the load: {reason}{hint}"
                 )
-            goal = min(1.0, share + step)
-            for predict in self._predictors(problem):
+            goal, creeps = min(1.0, share + step), share > 0 or bool(problem.known_state.any())
+            for predict in predictors(problem):
                 try:
                     first = predict(problem, share, goal, v, target, linear)
                     if goal == 1.0:
                         states = problem.states(first, (problem.at_share(share), v))
-                        yield from shown.best(self._newton(problem, states, target, linear))
+                        found = self._newton(problem, states, target, linear, creeps)
+                        yield from shown.best(found)
                     then = problem.at_share(goal)
                     states = then.states(first, (problem.at_share(share), v))
-                    v, steps = self._equilibrium(then, states, target, linear)
+                    found = self._newton(then, states, target, linear, creeps)
+                    before = shown.waiting
+                    v = shown.reached(found, then, states.v(states.start))
                     break
-                except (_Failed, InvertedCells) as failure:
+                except (Failed, InvertedCells) as failure:
                     reason = str(failure)
             else:
-                step /= 4 if share == 0 and step == 1.0 else 2
+                step = (goal - share) / (4 if goal - share == 1.0 else 2)
                 continue
-            shown.waiting += steps
             share = goal
-            step *= 2 if steps <= EASY else 1
-
-    def _predictors(self, problem: NonlinearProblem) -> Sequence[Callable[..., Array]]:
-        """In the order in which they are tried."""
-        tangent, contact = self._predict, self._predict_contact
-        if problem.shortest > 0 and not problem.meets_first:
-            if problem.unknowns >= LARGE[problem.dimension]:
-                return self._predict_by_cycles, tangent, contact
-            return contact, tangent
-        return (contact, tangent) if problem.meets_first else (tangent, contact)
-
-    def _predict(
-        self, problem: NonlinearProblem, share: float, goal: float, v: Array, target: Target,
-        linear: LinearSteps,
-    ) -> Array:  # fmt: skip
-        """The tangent predictor from a state at one share of the load to another."""
-        try:
-            here, change = problem.predicted(share, goal, v)
-            now = problem.at_share(share)
-            return v + self._solve(now, v, here, here.residual + change, linear)[0]
-        except (InvertedCells, SingularOperator) as reason:
-            raise _Failed(str(reason)) from reason
-
-    def _predict_contact(
-        self, problem: NonlinearProblem, share: float, goal: float, v: Array, target: Target,
-        linear: LinearSteps,
-    ) -> Array:  # fmt: skip
-        """The solution of the tangent problem with contact: its statuses are right together.
-
-        Newton's steps change them one after another, and may go round in circles where many
-        contacts close at once.
-        """
-        from ..auto.hybrid import Auto  # which takes this method, too
-
-        whole = problem.towards(share, goal, v)
-        whole = replace(whole, near_nullspace=None)  # by factors, which are cheaper here
-        tangent = whole if whole.law.varies else whole.plain  # with springs behind v
-        start = Iterate(np.zeros((tangent.contacts, tangent.dimension)))
-        try:
-            is_brief = tangent.gains_energy or not problem.meets_first  # another way is next
-            most = EARLY if is_brief else CONTACT_STEPS
-            iterates = first_of(Auto().iterates(tangent, start, target), most)
-            iterate = sent(iterates, None)
-            while iterate is not None:
-                state = iterate.v if iterate.v is not None else tangent.velocity(iterate.r)[1]
-                error = tangent.error(iterate.r, state)
-                if error <= STATUSES and state is not None:
-                    return state[: whole.unknowns]
-                if target.deadline.passed:
-                    break
-                iterate = sent(iterates, Judgement(error, None, target.deadline))
-        except (Breakdown, SingularOperator) as reason:
-            raise _Failed(str(reason)) from reason
-        raise _Failed("the tangent problem with contact was not solved")
-
-    def _predict_by_cycles(
-        self, problem: NonlinearProblem, share: float, goal: float, v: Array, target: Target,
-        linear: LinearSteps,
-    ) -> Array:  # fmt: skip
-        """The same to ROUGH, for about the price of one Newton step whatever the size."""
-        from ..multigrid.cycles import ContactMultigrid  # as above
-
-        whole = problem.towards(share, goal, v)
-        tangent, cycles = whole if whole.law.varies else whole.plain, 0
-        start = Iterate(np.zeros((tangent.contacts, tangent.dimension)))
-        try:
-            goal_of_cycles = Target(ROUGH, target.deadline)
-            for iterate in ContactMultigrid().iterates(tangent, start, goal_of_cycles):
-                cycles += iterate.iterations
-                if iterate.v is not None and iterate.own[-1] <= ROUGH:
-                    return iterate.v[: whole.unknowns]
-                if cycles >= CYCLES or target.deadline.passed:
-                    break
-        except (Breakdown, SingularOperator, UnsupportedForm) as reason:
-            raise _Failed(str(reason)) from reason
-        raise _Failed("the tangent problem with contact was not solved")
-
-    def _equilibrium(
-        self, problem: NonlinearProblem, states: States, target: Target, linear: LinearSteps
-    ) -> tuple[Array, int]:
-        """(v, Newton steps) at a load between, found loosely."""
-        steps, v = 0, states.v(states.start)
-        found = self._newton(problem, states, target, linear)
-        while problem.error(problem.reactions(v), v) > LOOSE:
-            v, steps = next(found)[0], steps + 1
-        return v, steps
+            step *= 2 if shown.waiting - before <= EASY else 1
 
     def _newton(
-        self, problem: NonlinearProblem, states: States, target: Target, linear: LinearSteps
-    ) -> Iterator[tuple[Array, Array, float]]:
-        """(v, r, |F| one step before) of Newton steps; _Failed when they lead nowhere."""
+        self, problem: NonlinearProblem, states: States, target: Target, linear: LinearSteps,
+        creeps: bool = False,
+    ) -> Iterator[tuple[Array, Array, float]]:  # fmt: skip
+        """(v, r, |F| one step before) of Newton steps; Failed when they lead nowhere.
+
+        creeps: over a jump, once.
+        """
         sizes: list[float] = []
         patience, w = Patience(self.patience), states.start
         while target.seconds_left > 0:
@@ -294,91 +192,34 @@ class NonlinearNewton:
                 sizes.append(size)
                 if again or patience.over(size):
                     self._stop(problem, v)
-                moved, factor = self._solve(
+                moved, factor = newton_step(
                     problem, v, here, here.residual, linear, forcing(sizes)
                 )
             except SingularOperator as reason:
-                raise _Failed(str(reason)) from reason
-            step = states.whole(w, moved)
+                raise Failed(str(reason)) from reason
+            step, goes = states.whole(w, moved), True
             if problem.shortest > 0:
-                w = w + self._natural_length(problem, states, w, step, factor) * step
+                length, goes = by_natural_test(problem, states, w, step, factor, self.halvings)
             else:
-                w = w + self._length(states, w, step, sizes) * step
-            yield states.v(w), problem.reactions(states.v(w)), size
+                length = by_residual(states, w, step, sizes, self.halvings)
+            if goes or not creeps:
+                w = w + length * step
+                yield states.v(w), problem.reactions(states.v(w)), size
+                continue
+            for way in creeping(problem, v, self.halvings, linear, target):
+                yield way, problem.reactions(way), np.inf
+                w = problem.states(way).start
+            creeps = False
+            sizes, patience = [], Patience(self.patience)
         raise Breakdown("out of time between two load steps")
 
     @staticmethod
     def _stop(problem: NonlinearProblem, v: Array) -> None:
-        """Raise _Failed, or Breakdown where the state is right up to rounding."""
+        """Raise Failed, or Breakdown where the state is right up to rounding."""
         reason = "Newton's steps no longer reduce the residual"
         if problem.error(problem.reactions(v), v) <= LOOSE:
             raise Breakdown(reason)
-        raise _Failed(reason)
-
-    @staticmethod
-    def _solve(
-        problem: NonlinearProblem, v: Array, here: Linear, F: Array, linear: LinearSteps,
-        tolerance: float = LOOSEST,
-    ) -> tuple[Array, Factor]:  # fmt: skip
-        """-dF/dv^-1 F and the factors; with more contacts closed where a body is loose."""
-        try:
-            return linear.solved(here, F, tolerance)
-        except SingularOperator:
-            for pieces in problem.closed_pieces(v):
-                try:
-                    return linear.solved(problem.linearisation(v, pieces), F, tolerance)
-                except SingularOperator:
-                    continue
-            raise
-
-    def _length(
-        self, states: States, w: Array, step: Array, sizes: list[float]
-    ) -> float:
-        """The part of a Newton step to take; the best of all tried where none is enough."""
-        allowed = max(sizes[-MEMORY:])
-        best, found, reason = np.inf, 0.0, ""
-        for k in range(self.halvings + 1):
-            length = 0.5**k
-            try:
-                size = float(np.linalg.norm(states.residual(w + length * step)))
-            except InvertedCells as why:
-                reason = str(why)
-                continue
-            if size <= (1 - ENOUGH * length) * allowed:
-                return length
-            if size < best:
-                best, found = size, length
-        if not np.isfinite(best):
-            raise _Failed(f"every step leads to where {reason}")
-        return found
-
-    def _natural_length(
-        self, problem: NonlinearProblem, states: States, w: Array, step: Array, factor: Factor
-    ) -> float:
-        """The same by the natural monotonicity test, no shorter than `problem.shortest`."""
-        size = float(np.linalg.norm(states.v(w + step) - states.v(w)))
-        best, found, reason = np.inf, 0.0, ""
-        for k in range(self.halvings + 1):
-            length = 0.5**k
-            if length < problem.shortest and np.isfinite(best):
-                break
-            try:
-                F = problem.residual(states.v(w + length * step))
-            except InvertedCells as why:
-                reason = str(why)
-                continue
-            again = float(np.linalg.norm(factor.solve(-F)))
-            if again <= (1 - NATURAL * length) * size:
-                return length
-            if again < best:
-                best, found = again, length
-        if not np.isfinite(best):
-            raise _Failed(f"every step leads to where {reason}")
-        return found
-
-
-class _Failed(Exception):
-    """Newton's method does not converge at this load."""
+        raise Failed(reason)
 
 
 @dataclass
@@ -397,3 +238,12 @@ class _Shown:
             if size < self.size:
                 yield Iterate(r, v, self.waiting, self.waiting, told)
                 self.size, self.waiting = size, 0
+
+    def reached(
+        self, steps: Iterator[tuple[Array, Array, float]], problem: NonlinearProblem, v: Array
+    ) -> Array:
+        """The first state from v on that is good enough for a load between."""
+        while problem.error(problem.reactions(v), v) > LOOSE:
+            v = next(steps)[0]
+            self.waiting += 1
+        return v

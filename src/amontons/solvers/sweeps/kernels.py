@@ -31,7 +31,7 @@ from numba import uint64
 from numpy.typing import NDArray
 
 from ...core.compiled import njit
-from ...core.copies import copy_inplace, copy_rows_inplace
+from ...core.copies import copy_rows_inplace
 from ...linear.block_kernels import full_product
 from ...problem.equations import JUDGE_FLOPS
 from ...problem.friction import FrictionProblem
@@ -49,6 +49,7 @@ from .local_contact import (
     newton_contact,
     projection_contact,
 )
+from .mixing import mix_inplace
 
 Array = NDArray[np.float64]
 T = TypeVar("T", int, tuple[int, float])
@@ -57,7 +58,6 @@ GOLDEN = 0.6180339887498949
 SLOWEST = 1e-9  # approach, relative to the fastest, below which contacts count as alike
 FIRST_JUDGED = 10.0  # change, in goals, at which the judge is asked first: sweeps may be quick
 SAFETY = 0.95  # of the change at which the judge is asked again
-SHIFT = 1e-13  # of the least-squares equations of Anderson acceleration, relative
 BLOCK_FLOPS, CONTACT_FLOPS = 18, 16  # of a sweep: per block of W, per contact besides
 LEAST = 1e-3  # factor by which that change falls at most from one judgement to the next
 
@@ -254,48 +254,6 @@ def sweeps_until_inplace(s, r, before, sweeps, tau):
     return sweeps, change
 
 
-@njit(cache=True, error_model="numpy")
-def _least_squares(gram, target, k, factor, weights):
-    """Solve (gram + tiny I) w = target for the leading k unknowns by L D L^T.
-
-    A direction that depends on earlier ones gets the weight zero; factor is working memory.
-    Returns False when all of gram is zero.
-    """
-    largest = 0.0
-    for i in range(k):
-        largest = max(largest, gram[i, i])
-    for i in range(k):
-        for j in range(i):
-            t = gram[i, j]
-            for l in range(j):
-                t -= factor[i, l] * factor[j, l] * factor[l, l]
-            factor[i, j] = t / factor[j, j]
-        pivot = gram[i, i] + SHIFT * largest
-        for l in range(i):
-            pivot -= factor[i, l] * factor[i, l] * factor[l, l]
-        factor[i, i] = pivot if pivot > 0.01 * SHIFT * largest else 1e300
-    for i in range(k):
-        t = target[i]
-        for l in range(i):
-            t -= factor[i, l] * weights[l]
-        weights[i] = t
-    for i in range(k - 1, -1, -1):
-        t = weights[i] / factor[i, i]
-        for l in range(i + 1, k):
-            t -= factor[l, i] * weights[l]
-        weights[i] = t
-    return largest > 0.0
-
-
-@njit(cache=True, error_model="numpy", fastmath={"contract", "reassoc", "nsz"})
-def _dot(a, b):
-    """a . b; summed in any order, so that it is vectorised."""
-    total = 0.0
-    for i in range(len(a)):
-        total += a[i] * b[i]
-    return total
-
-
 @njit(cache=True, error_model="numpy", fastmath={"contract", "reassoc"})
 def anderson_inplace(s, r, x, history, gram, count, sweeps, watch):  # noqa: PLR0913
     """Accelerated sweeps; r ends as the last plain sweep.  Returns sweeps done.
@@ -313,48 +271,6 @@ def anderson_inplace(s, r, x, history, gram, count, sweeps, watch):  # noqa: PLR
             return k + 1
         mix_inplace(r, x, history, gram, count)
     return sweeps
-
-
-@njit(cache=True, error_model="numpy", fastmath={"contract", "reassoc"})
-def mix_inplace(r, x, history, gram, count):
-    """x becomes the next point to sweep from, r being the sweep from x; see above."""
-    depth = history.shape[1] - 1
-    m = history.shape[2]
-    steps, slopes = history[0], history[1]
-    image, residual, target = steps[depth], slopes[depth], gram[depth]
-    weights, factor = np.zeros(depth), np.zeros((depth, depth))
-    g, xf = r.reshape(m), x.reshape(m)
-    size = old_size = 0.0
-    for i in range(m):
-        size += (g[i] - xf[i]) ** 2
-        old_size += residual[i] ** 2
-    if count[1] == 0 or size > 4.0 * old_size:
-        count[0] = 0
-        for i in range(m):
-            residual[i] = g[i] - xf[i]
-    else:
-        slot = count[0] % depth
-        count[0] += 1
-        step, slope = steps[slot], slopes[slot]
-        for i in range(m):
-            f = g[i] - xf[i]
-            step[i], slope[i] = g[i] - image[i], f - residual[i]
-            residual[i] = f
-        for a in range(min(count[0], depth)):
-            product = _dot(slopes[a], residual)
-            # slope = f - f_old: its products are differences of those with f
-            gram[a, slot] = gram[slot, a] = product - target[a]
-            target[a] = product
-        gram[slot, slot] = _dot(slope, slope)
-    count[1] = 1
-    filled = min(count[0], depth)
-    copy_inplace(g, image)
-    copy_inplace(g, xf)
-    if filled > 0 and _least_squares(gram, target, filled, factor, weights):
-        for a in range(filled):
-            w, step = weights[a], steps[a]
-            for i in range(m):
-                xf[i] -= w * step[i]
 
 
 def watch_for(goal: float) -> Array:

@@ -12,16 +12,16 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...core.compiled import njit
-from ...core.threads import Range, shared, split, threads
+from ...core.threads import Range, over_blocks, shared, split, threads
 from .chunks import SUMMED, stages_of
 from .kernels import (
     Sweep,
     anderson_inplace,
     content,
-    mix_inplace,
     sweeps_inplace,
     visit_inplace,
 )
+from .mixing import choose, combine, record, sums_of
 
 Array = NDArray[np.float64]
 CONTACT_WORK = 150.0  # of a contact, in numbers that a sweep touches
@@ -92,10 +92,21 @@ def anderson(  # noqa: PLR0913
     sweep = SharedSweep.of(s)
     if sweep is None:
         return anderson_inplace(s, r, x, history, gram, stored, count, watch)
+    r[:, :] = x
     for k in range(count):
-        r[:, :] = x
         if content(s, r, sweep(r), watch):
             x[:, :] = r
             return k + 1
-        mix_inplace(r, x, history, gram, stored)
+        _mix(r, x, history, gram, stored, x if k + 1 == count else r)
     return count
+
+
+def _mix(r: Array, x: Array, history: Array, gram: Array, stored: NDArray, into: Array) -> None:  # noqa: PLR0913
+    """As `mix_inplace`; what x becomes is put `into` as well."""
+    sums, weights = sums_of(history), np.zeros(gram.shape[1])
+    g, point, size = r.reshape(-1), x.reshape(-1), float(r.size)
+    used = min(int(stored[0]) + 1, len(weights))
+    over_blocks(record, r.size, (6.0 + used) * size, g, point, history, stored, sums)
+    filled = choose(gram, stored, sums, weights)
+    work = (3.0 + filled) * size
+    over_blocks(combine, r.size, work, g, point, into.reshape(-1), history, weights, filled)
