@@ -12,6 +12,7 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import lru_cache
 
 import numpy as np
 from numpy.typing import NDArray
@@ -40,6 +41,7 @@ Array = NDArray[np.float64]
 Counts = NDArray[np.int64]
 SHORT = 5e3  # nanoseconds of a sweep of a problem that is solved here whatever its tolerance
 COARSE, BLOCKS = 1e-4, 10_000  # tolerance from which, blocks of W to which larger ones are
+SIZES = 4096  # of problems whose counts are kept: time steps have the same again and again
 # Columns of what is told of a problem.
 SWEEPS, START, ERROR, WORST, CONTACT, HIDDEN, CHANGED, WORK = range(8)
 NO_NUMBERS = read_only(np.empty(0))
@@ -52,11 +54,18 @@ def is_brief(problem: FrictionProblem, tolerance: float) -> bool:
     the race, or where the goal is so near that most problems reach it in them.
     """
     blocks = len(problem.blocks.indices)
-    if nanoseconds_of_sweep(blocks, problem.contacts, HISTORY_CONTACT) <= SHORT:
+    if _is_short(blocks, problem.contacts):
         return True
     return tolerance >= COARSE and blocks <= BLOCKS
 
 
+@lru_cache(maxsize=SIZES)
+def _is_short(blocks: int, contacts: int) -> bool:
+    """Whether a sweep costs no more than SHORT."""
+    return nanoseconds_of_sweep(blocks, contacts, HISTORY_CONTACT) <= SHORT
+
+
+@lru_cache(maxsize=SIZES)
 def sweeps_of_first_chunks(blocks: int, contacts: int) -> int:
     """Sweeps of the chunks that the first track of the race has before all others."""
     cost, total, done = nanoseconds_of_sweep(blocks, contacts, HISTORY_CONTACT), 0.0, 0

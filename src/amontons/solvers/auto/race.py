@@ -49,7 +49,7 @@ from .state import State
 Array = NDArray[np.float64]
 WINDOW = 0.7  # last part of a track's cost from which its rate is told
 FIRST_CHUNKS = 3  # of the first track before its rate counts
-GRACE = 1.5  # times the cost at which a track has promised the goal: its promise is broken
+GRACE = 1.2  # times the cost at which a track has promised the goal: its promise is broken
 # Logarithm of the way to the goal, over that of the way to the best error, up to which that is
 # near; multiple of the best error at which it is taken to have been come by.
 NEAR, ALMOST = 1.5, 2.0

@@ -125,12 +125,12 @@ def interior_point(state: State) -> Chunks:
     while True:
         relaxation, done = Relaxation.of(state.work, slip, solver.shift), 0
         while done < RELAXED:
-            steps = int(np.clip(turn.cost / state.step_cost, 1, RELAXED - done))
+            each = state.relaxation_cost if relaxation.shares else state.step_cost
+            steps = int(np.clip(turn.cost / each, 1, RELAXED - done))
             count = relaxation.advance(state.goal, state.affordable(steps))
             done += count
-            cost = max(count, 1) * state.step_cost
-            turn = yield Chunk(relaxation.r.copy(), max(count, 1), cost)
-            if count < steps:
+            turn = yield Chunk(relaxation.r.copy(), max(count, 1), max(count, 1) * each)
+            if relaxation.ended:
                 break
         slip = sliding_speed(problem, relaxation.r[:, : problem.dimension])
         memory = Acceleration(state.data, relaxation.r, DEPTH)

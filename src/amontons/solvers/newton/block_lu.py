@@ -62,9 +62,28 @@ def _analyse(problem: FrictionProblem) -> Symbolic:
 
 
 def analyse(blocks: BlockRows) -> Symbolic:
-    """Minimum-degree order of the block graph and its fill; about nc deg nc / 64 operations."""
-    order, start, later = _minimum_degree(blocks.indptr, blocks.indices)
+    """The same of block rows."""
+    return analyse_pattern(blocks.indptr, blocks.indices)
+
+
+def analyse_pattern(indptr: Index, indices: Index) -> Symbolic:
+    """Minimum-degree order of a block graph and its fill; about nc deg nc / 64 operations."""
+    order, start, later = _minimum_degree(indptr, indices)
     return Symbolic(order, *_structure(order, start, later))
+
+
+@njit(cache=True, error_model="numpy")
+def found(indptr, indices, row, column):
+    """Where a block is stored, columns ascending; -1 where it is not."""
+    low, high = indptr[row], indptr[row + 1]
+    end = high
+    while low < high:
+        middle = (low + high) // 2
+        if indices[middle] < column:
+            low = middle + 1
+        else:
+            high = middle
+    return low if low < end and indices[low] == column else -1
 
 
 def analyse_doubled(indptr: Index, indices: Index) -> Symbolic:

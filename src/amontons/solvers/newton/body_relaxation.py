@@ -26,14 +26,15 @@ from ...core.compiled import njit
 from ...problem.judge.measures import natural_error
 from ...problem.law.law import MU, TIED
 from ..sweeps.on_bodies import GROUND, driven_inplace, felt_inplace
-from .block_lu import Symbolic, analyse_doubled, factorise_inplace, solve_inplace
+from .block_lu import Symbolic, analyse_doubled, factorise_inplace, found, solve_inplace
 from .cone_steps import (
     advance_inplace,
     centering,
     changes_inplace,
-    nesterov_todd_inplace,
+    residual_inplace,
     right_side_inplace,
     room,
+    scaled_blocks_inplace,
 )
 from .interior_point import BOUNDARY, ENOUGH, SHORT, STALLED
 
@@ -108,35 +109,12 @@ def _rows_in_halves(indptr, indices):
     return starts, columns
 
 
-@njit(cache=True, error_model="numpy")
-def _scaling(x, y, mu, i, beta, w, lam, E, inverse):
-    """Scaling (beta, w) and lambda of contact i, and its blocks E and E^-1."""
-    k = nesterov_todd_inplace(x, y, i, beta, w, lam)
-    for a in range(3):
-        for b in range(3):
-            sign = 1.0 if (a == 0) == (b == 0) else -1.0
-            E[i, a, b] = 2.0 * k * w[i, a] * w[i, b]
-            inverse[i, a, b] = 2.0 * sign * w[i, a] * w[i, b] / k
-        E[i, a, a] += -k if a == 0 else k
-        inverse[i, a, a] += -1.0 / k if a == 0 else 1.0 / k
-    if mu == 0.0:
-        for a in range(1, 3):
-            E[i, a, 0] = E[i, 0, a] = inverse[i, a, 0] = inverse[i, 0, a] = 0.0
-            E[i, 1, a] = E[i, 2, a] = inverse[i, 1, a] = inverse[i, 2, a] = 0.0
-    else:
-        for a in range(3):
-            E[i, 0, a] *= mu
-            E[i, a, 0] *= mu
-            inverse[i, 0, a] /= mu
-            inverse[i, a, 0] /= mu
-
-
 @njit(cache=True, error_model="numpy", fastmath={"contract"})
 def _assemble(levers, sides, inverse, indptr, indices, data):
     """1 + G^T E^-1 G into blocks (., 3, 3)."""
     data[:] = 0.0
     for b in range(len(indptr) - 1):
-        place = _found(indptr, indices, b, b)
+        place = found(indptr, indices, b, b)
         for a in range(3):
             data[place, a, a] = 1.0
     product = np.empty((3, 6))
@@ -156,7 +134,7 @@ def _assemble(levers, sides, inverse, indptr, indices, data):
                     continue
                 T = levers[i, o]
                 for upper in range(2):
-                    at = _found(indptr, indices, 2 * c + upper, 2 * b)
+                    at = found(indptr, indices, 2 * c + upper, 2 * b)
                     for right in range(2):
                         block = data[at + right]
                         for k in range(3):
@@ -167,19 +145,6 @@ def _assemble(levers, sides, inverse, indptr, indices, data):
                                     T[0, f] * product[0, e] + T[1, f] * product[1, e]
                                     + T[2, f] * product[2, e]
                                 )  # fmt: skip
-
-
-@njit(cache=True, error_model="numpy")
-def _found(indptr, indices, row, column):
-    """Where a stored block is."""
-    low, high = indptr[row], indptr[row + 1]
-    while low < high:
-        middle = (low + high) // 2
-        if indices[middle] < column:
-            low = middle + 1
-        else:
-            high = middle
-    return low
 
 
 @njit(cache=True, error_model="numpy", fastmath={"contract"})
@@ -257,32 +222,19 @@ def relax_on_bodies_inplace(  # noqa: PLR0913
     for count in range(steps):
         driven_inplace(levers, sides, r, turned)
         felt_inplace(levers, sides, turned, u)
-        gap = away = total = 0.0
-        free = 0
+        u += q
+        left, total, free = residual_inplace(x, y, u, s, mu, able, rho, residual)
         for i in range(n):
-            for a in range(3):
-                u[i, a] += q[i, a]
-            if able[i] <= 0.0:
-                if kind[i] == TIED:
-                    for a in range(3):
-                        residual[i, a] = -u[i, a]
-                        away += u[i, a] ** 2
-                continue
-            free += 1
-            scale = 1.0 / mu[i] if mu[i] > 0.0 else 1.0
-            residual[i, 0] = y[i, 0] - scale * u[i, 0] - s[i]
-            for a in range(1, 3):
-                residual[i, a] = y[i, a] - u[i, a] if mu[i] > 0.0 else 0.0
-            for a in range(3):
-                total += x[i, a] * y[i, a]
-                gap += max(x[i, a] * y[i, a], 0.0) / rho[i]
-                away += residual[i, a] ** 2
+            if kind[i] == TIED:
+                for a in range(3):
+                    residual[i, a] = -u[i, a]
+                    left += u[i, a] ** 2
         error = natural_error(blocks[0], blocks[1], blocks[2], q, kind, law[1], rho, r)
-        if error <= goal or math.sqrt(away + gap) <= max(ENOUGH * error, 0.1 * goal):
+        if error <= goal or math.sqrt(left) <= max(ENOUGH * error, 0.1 * goal):
             return count
         for i in range(n):
             if able[i] > 0.0:
-                _scaling(x, y, mu[i], i, beta, w, lam, E, inverse)
+                scaled_blocks_inplace(x, y, mu[i], 0.0, i, beta, w, lam, E, inverse)
         mean = total / max(free, 1)
         factor = order, upper_start, upper, lower_start, lower, U, L, pivots
         _assemble(levers, sides, inverse, indptr, indices, data)

@@ -46,6 +46,38 @@ def nesterov_todd_inplace(x, y, i, beta, w, lam):
 
 
 @njit(cache=True, error_model="numpy")
+def scaled_blocks_inplace(x, y, mu, shift, i, beta, w, lam, E, inverse):
+    """Scaling (beta, w) and lambda of contact i, and its blocks E = S^-1 (D + e 1) S^-1, E^-1.
+
+    D = k (2 w w^T - J), J = diag(1, -1, -1), has the eigenvalues k g^2, k / g^2 and k, with
+    g = w_0 + |w_T|, on (1, n), (1, -n) and across, n along w_T: nothing cancels, in the inverse
+    neither.  S = diag(1 / mu, 1, 1); e: at least shift on each component of E.  Where mu = 0
+    both blocks are zero on the tangents.
+    """
+    k = nesterov_todd_inplace(x, y, i, beta, w, lam)
+    along = math.sqrt(w[i, 1] ** 2 + w[i, 2] ** 2)
+    n, m = (w[i, 1] / along, w[i, 2] / along) if along > 0.0 else (1.0, 0.0)
+    g = w[i, 0] + along
+    e = shift / min(mu * mu, 1.0) if mu > 0.0 else shift
+    most, least, across = k * g * g + e, k / (g * g) + e, k + e
+    if mu == 0.0:
+        E[i] = inverse[i] = 0.0
+        E[i, 0, 0], inverse[i, 0, 0] = most, 1.0 / most
+        return
+    for block, p, r, c, scale in (
+        (E[i], most, least, across, mu),
+        (inverse[i], 1.0 / most, 1.0 / least, 1.0 / across, 1.0 / mu),
+    ):
+        mean, half = 0.5 * (p + r), 0.5 * (p - r)
+        block[0, 0] = mean * scale * scale
+        block[0, 1] = block[1, 0] = half * n * scale
+        block[0, 2] = block[2, 0] = half * m * scale
+        block[1, 1] = mean * n * n + c * m * m
+        block[2, 2] = mean * m * m + c * n * n
+        block[1, 2] = block[2, 1] = (mean - c) * n * m
+
+
+@njit(cache=True, error_model="numpy")
 def room(x, dx, rho):
     """Largest a with x + a dx in all cones, of the contacts that can react."""
     room = math.inf
@@ -66,6 +98,29 @@ def room(x, dx, rho):
         if d0 < 0.0:
             room = min(room, -x[i, 0] / d0)
     return room
+
+
+@njit(cache=True, error_model="numpy")
+def residual_inplace(x, y, u, s, mu, able, rho, residual):  # noqa: PLR0913
+    """residual = y - S u - s e_N, S = diag(1/mu, 1, 1), of the contacts with able above 0.
+
+    Returns the sum of its squares and of what x . y leaves in the unit of u, x . y, and how
+    many contacts these are.
+    """
+    left = total = 0.0
+    count = 0
+    for i in range(len(mu)):
+        if able[i] <= 0.0:
+            continue
+        count += 1
+        scale = 1.0 / mu[i] if mu[i] > 0.0 else 1.0
+        residual[i, 0] = y[i, 0] - scale * u[i, 0] - s[i]
+        for a in range(1, 3):
+            residual[i, a] = y[i, a] - u[i, a] if mu[i] > 0.0 else 0.0
+        for a in range(3):
+            total += x[i, a] * y[i, a]
+            left += max(x[i, a] * y[i, a], 0.0) / rho[i] + residual[i, a] ** 2
+    return left, total, count
 
 
 @njit(cache=True, error_model="numpy")

@@ -12,7 +12,8 @@ crawls.  With the Nesterov-Todd scaling D x = y, D = F F, lambda = F x, a step s
     (W + S^-1 D S^-1) dr = S^-1 (F p + R),   p = lambda^-1 o (sigma m e - lambda o lambda - c),
 
 R = y - S u - s e_N the residual, m = x . y / nc, c the corrector: W plus 3x3 blocks again, the
-matrix of `block_lu`.  Then s = |u_T| of the result, and so on [C, AANS]; accelerated sweeps
+matrix of `block_lu`, or by the faces that contacts of rigid bodies share (`faces`,
+`face_steps`).  Then s = |u_T| of the result, and so on [C, AANS]; accelerated sweeps
 from each result often end it at once, as most contacts of a pile stick and s = 0 was right.
 
 A contact with mu = 0 has the half line x_N >= 0 in place of the cone.
@@ -49,9 +50,13 @@ from .cone_steps import (
     centering,
     changes_inplace,
     nesterov_todd_inplace,
+    residual_inplace,
     right_side_inplace,
     room,
+    scaled_blocks_inplace,
 )
+from .face_steps import face_memory, factorise_faces_inplace, step_by_faces_inplace
+from .faces import NONE
 from .smoothing import PINNED, Workspace
 
 Array = NDArray[np.float64]
@@ -83,72 +88,96 @@ def _newton_block(x, y, mu, shift, i, beta, w, lam, extra):
 
 
 @njit(cache=True, error_model="numpy")
+def _scalings_inplace(faces, x, y, mu, rho, shift, scaling, extra, turned):  # noqa: PLR0913
+    """Scaling of every contact and its block E in extra; E^-1 of those on faces in turned."""
+    beta, w, lam = scaling
+    sharing = len(faces.first) > 1
+    for i in range(len(mu)):
+        if rho[i] <= 0.0:
+            for a in range(3):
+                extra[i, a, a] = 1e300
+        elif sharing and faces.face[i] >= 0:
+            scaled_blocks_inplace(x, y, mu[i], shift / rho[i], i, beta, w, lam, extra, turned)
+        else:
+            _newton_block(x, y, mu[i], shift / rho[i], i, beta, w, lam, extra)
+
+
+@njit(cache=True, error_model="numpy")
+def _factorised_inplace(W, faces, extra, turned, symbolic, factor):
+    """False at a singular pivot; factor: U, L, pivots, work and the memory of faces."""
+    U, L, pivots, work, memory = factor
+    if len(faces.first) > 1:
+        return factorise_faces_inplace(faces, extra, turned, symbolic, U, L, memory)
+    order, upper_start, upper, lower_start, lower = symbolic
+    return factorise_inplace(
+        W[0], W[1], W[2], extra, order, upper_start, upper, lower_start, lower, U, L, pivots,
+        work,
+    )  # fmt: skip
+
+
+@njit(cache=True, error_model="numpy")
+def _solved_inplace(W, faces, extra, turned, symbolic, factor, f, dr, du):  # noqa: PLR0913
+    """dr (nc, 3) = (W + E)^-1 f and du = W dr; False where they are not finite."""
+    U, L, pivots, _, memory = factor
+    if len(faces.first) > 1:
+        step_by_faces_inplace(W, faces, extra, turned, symbolic, U, L, memory, f, dr, du)
+    else:
+        order, upper_start, upper, lower_start, lower = symbolic
+        solve_inplace(order, upper_start, upper, lower_start, lower, U, L, pivots, f, dr)
+        velocity_of_rows_inplace(0, len(f), W[0], W[1], W[2], np.zeros(f.shape), dr, du)
+    return math.isfinite(np.sum(du))
+
+
+@njit(cache=True, error_model="numpy")
 def relax_inplace(  # noqa: PLR0913
     indptr, indices, data, q, kind, parameters, rho, order, upper_start, upper, lower_start,
-    lower,
-    r, x, y, s, shift, goal, steps, short,
+    lower, faces, r, x, y, s, shift, goal, steps, short,
 ):  # fmt: skip
     """Predictor-corrector steps on (r, x, y) with s frozen; x and y inside the cones on entry.
 
+    order to lower: a factor's symbols, of W, or of X where faces (`faces.Faces`) has some.
     short (1,): short steps in a row so far, with which a call goes on where the last one ended.
     shift: added to the diagonal, relative to |W_ii|; goal: error, unit of u, at which to stop.
-    Returns steps done; r is the last iterate, and finite.
+    Returns steps done, -1 less those where no step helps; r is the last iterate, and finite.
     """
-    mu = parameters[:, MU].copy()
-    nc = len(mu)
-    extra, inverse, work = np.zeros((nc, 3, 3)), np.empty((nc, 3, 3)), np.zeros((nc, 3, 3))
-    U, L = np.empty((len(upper), 3, 3)), np.empty((len(upper), 3, 3))
-    zero, u, du = np.zeros((nc, 3)), np.empty((nc, 3)), np.empty((nc, 3))
-    rhs, dr = np.zeros((nc, 3)), np.empty((nc, 3))
+    mu, W = parameters[:, MU].copy(), (indptr, indices, data)
+    nc, n = len(mu), len(order)
+    extra, turned = np.zeros((nc, 3, 3)), np.zeros((len(faces.face), 3, 3))
+    symbolic = order, upper_start, upper, lower_start, lower
+    factor = (
+        np.empty((len(upper), 3, 3)), np.empty((len(upper), 3, 3)), np.empty((n, 3, 3)),
+        np.zeros((n, 3, 3)), face_memory(faces),
+    )  # fmt: skip
+    u, du, rhs, dr = (
+        np.empty((nc, 3)), np.empty((nc, 3)), np.zeros((nc, 3)), np.empty((nc, 3)),
+    )  # fmt: skip
     dx, dy, residual = np.zeros((nc, 3)), np.zeros((nc, 3)), np.zeros((nc, 3))
     lam, w, beta = np.empty((nc, 3)), np.empty((nc, 3)), np.empty(nc)
     for count in range(steps):
         velocity_of_rows_inplace(0, len(q), indptr, indices, data, q, r, u)
-        gap = away = 0.0
-        able = 0
-        for i in range(nc):
-            if rho[i] <= 0.0:
-                continue
-            able += 1
-            scale = 1.0 / mu[i] if mu[i] > 0.0 else 1.0
-            residual[i, 0] = y[i, 0] - scale * u[i, 0] - s[i]
-            for a in range(1, 3):
-                residual[i, a] = y[i, a] - u[i, a] if mu[i] > 0.0 else 0.0
-            for a in range(3):
-                gap += max(x[i, a] * y[i, a], 0.0) / rho[i]
-                away += residual[i, a] ** 2
+        left, total, able = residual_inplace(x, y, u, s, mu, rho, rho, residual)
         error = natural_error(indptr, indices, data, q, kind, parameters, rho, r)
-        if error <= goal or math.sqrt(away + gap) <= max(ENOUGH * error, 0.1 * goal):
+        if error <= goal or math.sqrt(left) <= max(ENOUGH * error, 0.1 * goal):
             return count
-        total = 0.0
-        for i in range(nc):
-            if rho[i] <= 0.0:
-                for a in range(3):
-                    extra[i, a, a] = 1e300
-                continue
-            total += x[i, 0] * y[i, 0] + x[i, 1] * y[i, 1] + x[i, 2] * y[i, 2]
-            _newton_block(x, y, mu[i], shift / rho[i], i, beta, w, lam, extra)
+        _scalings_inplace(faces, x, y, mu, rho, shift, (beta, w, lam), extra, turned)
         mean = total / max(able, 1)
-        if not factorise_inplace(
-            indptr, indices, data, extra, order, upper_start, upper, lower_start, lower,
-            U, L, inverse, work,
-        ):  # fmt: skip
-            return count
+        if not _factorised_inplace(W, faces, extra, turned, symbolic, factor):
+            return -1 - count
         sigma = length = 0.0
         for phase in range(2):
             right_side_inplace(phase, sigma, mean, mu, rho, lam, beta, w, dx, dy, residual, rhs)
-            solve_inplace(order, upper_start, upper, lower_start, lower, U, L, inverse, rhs, dr)
-            velocity_of_rows_inplace(0, len(q), indptr, indices, data, zero, dr, du)
+            if not _solved_inplace(W, faces, extra, turned, symbolic, factor, rhs, dr, du):
+                return -1 - count
             changes_inplace(1.0 - sigma, mu, rho, residual, dr, du, dx, dy)
             length = min(room(x, dx, rho), room(y, dy, rho))
             if not length > 0.0:
-                return count
+                return -1 - count
             length = min(1.0, length * (1.0 if phase == 0 else BOUNDARY))
             if phase == 0:
                 sigma = centering(x, y, dx, dy, rho, length, total)
         short[0] = short[0] + 1 if length < SHORT else 0
         if short[0] > STALLED:
-            return count
+            return -1 - count
         advance_inplace(x, y, r, dx, dy, mu, rho, length)
     return steps
 
@@ -202,9 +231,11 @@ class InteriorPoint:
         self, work: Workspace, slip: Array, goal: float, deadline: Deadline = NEVER
     ) -> tuple[int, Array]:
         """(steps, r) of the relaxation with frozen |u_T|, (nc,); goal: error, unit of u."""
-        relaxation = Relaxation.of(work, slip, self.shift)
-        steps = relaxation.advance(goal, work.affordable(self.steps, deadline))
-        return max(steps, 1), relaxation.r
+        relaxation, done = Relaxation.of(work, slip, self.shift), 0
+        most = work.affordable(self.steps, deadline)
+        while done < most and not relaxation.ended:
+            done += relaxation.advance(goal, most - done)
+        return max(done, 1), relaxation.r
 
 
 @dataclass(eq=False)
@@ -218,6 +249,8 @@ class Relaxation:
     y: Array
     r: Array
     short: Index = field(default_factory=lambda: np.zeros(1, dtype=np.int64))
+    shares: bool = True  # steps by faces, where there are; no more once none of them helps
+    ended: bool = False
 
     @classmethod
     def of(cls, work: Workspace, slip: Array, shift: float) -> Relaxation:
@@ -230,11 +263,23 @@ class Relaxation:
         return cls(work, np.where(mu > 0, slip, 0.0), shift, x, y, r)
 
     def advance(self, goal: float, steps: int) -> int:
-        """Steps done of some, fewer at its end; goal: error, unit of u."""
-        return relax_inplace(
-            *self.work.problem.kernel_data, *self.work.symbolic.arrays, self.r, self.x, self.y,
-            self.slip, self.shift, goal, steps, self.short,
+        """Steps done of some, fewer where its way changes or ends; goal: error, unit of u.
+
+        The factor of the whole, which loses fewer digits, goes on where that by faces has come
+        to its last.
+        """
+        sharing = self.work.sharing
+        self.shares = self.shares and sharing.faces is not NONE
+        arrays = sharing.arrays if self.shares else (*self.work.symbolic.arrays, NONE)
+        done = relax_inplace(
+            *self.work.problem.kernel_data, *arrays, self.r, self.x, self.y, self.slip,
+            self.shift, goal, steps, self.short,
         )  # fmt: skip
+        if done < 0 and self.shares:
+            self.shares, self.short[0] = False, 0
+            return -1 - done
+        self.ended = done < steps
+        return done if done >= 0 else -1 - done
 
 
 def sliding_speed(problem: FrictionProblem, r: Array) -> Array:

@@ -27,6 +27,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator
 from dataclasses import dataclass, field
+from functools import cached_property
 from typing import ClassVar
 
 import numpy as np
@@ -45,6 +46,7 @@ from ...problem.law.law import MU
 from ..contract import Breakdown, Iterate, Target, check_at_least, check_positive
 from ..sweeps.kernels import sweep_data, sweep_inplace
 from .block_lu import Symbolic, factorise_inplace, solve_inplace
+from .faces import FaceMatrix
 
 Array = NDArray[np.float64]
 PINNED = 1e16  # relative stiffness that keeps r_T = 0 where mu = 0
@@ -293,6 +295,11 @@ class Workspace:
                 f"{problem.law.name}; use SemismoothNewton or GaussSeidel"
             )
         return cls(problem, Symbolic.of(problem))
+
+    @cached_property
+    def sharing(self) -> FaceMatrix:
+        """Faces that contacts share, for steps of interior points."""
+        return FaceMatrix.of(self.problem)
 
     @property
     def step_seconds(self) -> float:
