@@ -49,8 +49,9 @@ class Problem:
         self.to_r, self.W, self.loads = self.unit / stiff, W / stiff, loads / self.unit
         need((self.W.diagonal() > 1e-99).all(), "W is not definite, or too small")
         self.rubs, S = self.mus.any(axis=0), (self.W + self.W.T) / 2
-        self.most = reach(S, self.loads, np.arange(len(W)) % 3 == 0) * (1 + 1e-9)
-        fast = [max(reach(S, self.loads, s * row) for s in (1, -1)) for row in self.W]
+        ends = [q for q in self.loads if q.any()]
+        self.most = max(reach(S, q, np.arange(len(W)) % 3 == 0) for q in ends) * (1 + 1e-9)
+        fast = [max(reach(S, q, s * row) for q in ends for s in (1, -1)) for row in self.W]
         fast = (np.array(fast) + abs(self.loads).max(axis=0)).reshape(-1, 3)
         self.fast = np.hypot(fast[:, 1], fast[:, 2]) * (1 + 1e-9)
 

@@ -1,11 +1,11 @@
 """All solutions in 2D, for one load or for all between two: each pattern excluded or solved.
 
 r_N = a + b, r_T = mu (a - b).  A solution dissipates, r W r + q r <= 0, which bounds a, b, u_N
-and u_T: g r <= b where [[k W, (k q - g) / 2], [., b]] is positive definite for some k > 0.  For
-every y it has y.u - (W^T y).r = y.q.  A pattern that fixes or signs a, b and u is excluded by a
-y for which the left side can not reach the right one.  The patterns that are left are linear
-systems, solved in rational numbers: r is linear in the load, and so are the numbers that the
-law wants not to be negative.
+and u_T: g r <= b where [[k W, (k q - g) / 2], [., b]] is positive definite for some k > 0, for
+loads between two by the larger b.  For every y it has y.u - (W^T y).r = y.q.  A pattern that
+fixes or signs a, b and u is excluded by a y for which the left side can not reach the right
+one.  The patterns that are left are linear systems, solved in rational numbers: r is linear in
+the load, and so are the numbers that the law wants not to be negative.
 """
 
 from fractions import Fraction
@@ -44,37 +44,40 @@ def lines(W, q, mu, patterns, y, left, r, distance, end=None, **_):
     return f"{one if end is None else 'all loads between two: solutions are on lines,'} {names}"
 
 
-def reach(W, loads, g):
-    """Bound of g r for all r W r + q r <= 0, q between the loads."""
+def reach(W, q, g):
+    """Bound of g r for all r W r + q r <= 0."""
     if not g.any():
         return 0.0
-    by_g, *by_q = np.linalg.solve(W, np.vstack([g, loads]).T).T
-    squares = g @ by_g, max(q @ x for q, x in zip(loads, by_q, strict=True))
+    by_g, by_q = np.linalg.solve(W, np.vstack([g, q]).T).T
+    squares = g @ by_g, q @ by_q
     need(min(squares) > 0, "W is not definite, or there is no load")
     size, load = np.sqrt(squares)
-    most = size * load / 2 - min(g @ x for x in by_q) / 2
+    most = size * load / 2 - g @ by_q / 2
     for room in (1e-6, 1e-3, 1.0):
         b, k = most + room * size * load, size / load
-        A = [np.block([[k * W, (k * q - g)[:, None] / 2], [(k * q - g) / 2, b]]) for q in loads]
-        sizes = [np.block([[k * abs(W), (k * abs(q) + abs(g))[:, None] / 2],
-                           [(k * abs(q) + abs(g)) / 2, abs(b)]]) for q in loads]  # fmt: skip
-        if all(positive_definite(x, 8 * U * s) for x, s in zip(A, sizes, strict=True)):
+        A = np.block([[k * W, (k * q - g)[:, None] / 2], [(k * q - g) / 2, b]])
+        terms = (k * abs(q) + abs(g)) / 2
+        sizes = np.block([[k * abs(W), terms[:, None]], [terms, abs(b)]])
+        if positive_definite(A, 8 * U * sizes):
             return b
     raise Refused("W is not definite: reactions are not bounded")
 
 
 def box(W, loads, mu):
-    """Ranges (nc, 4) of a, b, u_N and u_T in all solutions."""
-    S, first, last = (W + W.T) / 2, loads.min(axis=0), loads.max(axis=0)
-    low, high = np.zeros((2, len(mu), 4))
+    """Ranges (nc, 4) of a, b, u_N and u_T in all solutions.
+
+    What bounds them at a load is convex in it: between two loads it is below the larger one.
+    """
+    S, low, high = (W + W.T) / 2, *np.zeros((2, len(loads), len(mu), 4))
     for i, (normal, tangent) in enumerate(np.eye(len(W)).reshape(-1, 2, len(W))):
         slope = tangent / mu[i] if mu[i] > 0 else normal
         for j, g in enumerate([normal + slope, normal - slope, 2 * W[2 * i], 2 * W[2 * i + 1]]):
-            low[i, j], high[i, j] = -reach(S, loads, -g / 2), reach(S, loads, g / 2)
-    low[:, 2:] += first.reshape(-1, 2)
-    high[:, 2:] += last.reshape(-1, 2)
-    room = 8 * U * (abs(low) + abs(high))
-    return low - room, high + room
+            low[:, i, j] = [-reach(S, q, -g / 2) for q in loads]
+            high[:, i, j] = [reach(S, q, g / 2) for q in loads]
+    for x in (low, high):
+        x[..., 2:] += loads.reshape(len(loads), -1, 2)
+    room = 8 * U * (abs(low) + abs(high) + abs(loads).max())
+    return (low - room).min(axis=0), (high + room).max(axis=0)
 
 
 def excludes(W, loads, mu, words, y):
