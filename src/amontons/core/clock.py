@@ -14,6 +14,7 @@ import math
 import threading
 import time
 from dataclasses import dataclass, replace
+from decimal import Decimal
 from numbers import Real
 
 from numba.core import event
@@ -173,7 +174,9 @@ class Deadline:
 
 def duration(seconds: float) -> str:
     """A duration in words, of two digits or whole seconds: never as a power of ten."""
-    return f"{seconds:.2g} s" if seconds < 99.5 else f"{seconds:.0f} s"
+    if seconds >= 99.5:
+        return f"{seconds:.0f} s"
+    return f"{Decimal(f'{seconds:.2g}'):f} s"
 
 
 NEVER = Deadline()

@@ -81,7 +81,7 @@ class Nodes:
         if self.plain:
             return np.array(x, dtype=float).reshape(-1, 3)
         out = np.zeros(3 * self.count)
-        put_at(self.place, np.ascontiguousarray(x, dtype=float), out)
+        put_at(self.place, np.ascontiguousarray(x, dtype=float).reshape(len(self.place)), out)
         return out.reshape(-1, 3)
 
     def gather(self, x: Array) -> Array:
@@ -89,7 +89,7 @@ class Nodes:
         if self.plain:
             return x.reshape(-1).copy()
         out = np.empty(len(self.place))
-        take_from(self.place, x.reshape(-1), out)
+        take_from(self.place, x.reshape(3 * self.count), out)
         return out
 
 

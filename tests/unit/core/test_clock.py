@@ -5,7 +5,7 @@ import time
 
 from numba import njit
 
-from amontons.core.clock import NEVER, Deadline, compiling, now
+from amontons.core.clock import NEVER, Deadline, compiling, duration, now
 
 
 def test_compiling_is_booked_apart():
@@ -35,3 +35,9 @@ def test_deadline():
     assert 9 < later.within(10.0).left <= 10
     assert 9 < NEVER.within(10.0).left <= 10
     assert NEVER.share(0.5).left == math.inf
+
+
+def test_durations_are_told_without_powers_of_ten():
+    words = {0.0: "0 s", 3e-5: "0.00003 s", 0.25: "0.25 s", 9.96: "10 s", 99.4: "99 s",
+             120.0: "120 s", 2e6: "2000000 s"}  # fmt: skip
+    assert {seconds: duration(seconds) for seconds in words} == words

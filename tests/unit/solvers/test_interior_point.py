@@ -67,6 +67,12 @@ def test_contacts_that_can_not_react_stay_open():
     assert solution.converged
     assert (solution.r[5] == 0).all()
     np.testing.assert_allclose(solution.r[:5], solve(alone).r, atol=1e-6)
+    # nor are the steps themselves: no sweeps have to make up for them
+    steps, r = am.InteriorPoint().relax(Workspace.of(problem), np.full(6, 0.1), 1e-9)
+    own = Workspace.of(alone.condensed())
+    expected = am.InteriorPoint().relax(own, np.full(5, 0.1), 1e-9)[1]
+    assert steps > 3
+    np.testing.assert_allclose(r[:5], expected, atol=1e-4)  # as far as steps go
 
 
 def test_planar_problem():

@@ -13,7 +13,7 @@ from typing import cast
 import numpy as np
 from numpy.typing import NDArray
 
-from ...core.clock import RATE, Deadline, TimeLimit, deadline_of, now
+from ...core.clock import RATE, Deadline, TimeLimit, deadline_of, duration, now
 from ...core.errors import InvalidInput, SingularOperator, TimeUp
 from ...core.onlookers import say
 from ...linear.dense import dense
@@ -170,7 +170,7 @@ def _not_examined(
     reason = cause.value[1]
     if cause is Cause.LARGE:
         seconds = BOUND_WORK * float(rows) ** 3 / RATE
-        reason += f": a bound takes some {seconds:.2g} s, more than a fifth of a solve"
+        reason += f": a bound takes some {duration(seconds)}, more than a fifth of a solve"
     return replace(without_verdict(problem, f"{reason}.", began), cause=cause)
 
 

@@ -35,7 +35,7 @@ from numpy.typing import NDArray
 
 from ...core.errors import SingularOperator
 from ...linear.blocks import spatial
-from ...linear.vectors import add_scaled, advance, norm
+from ...linear.vectors import add_scaled, advance, dot, norm
 from ...problem.law.law import TRESCA
 from ...problem.law.states import ContactStatus
 from ...solvers.contract import Breakdown
@@ -274,11 +274,6 @@ def _iterated(cycle: _Cycle, force: Array, start: Array) -> tuple[Array, Array, 
     return x, product, count
 
 
-def _dot(a: Array, b: Array) -> float:
-    """a . b, as fast as the library makes it."""
-    return float(np.dot(a.reshape(-1), b.reshape(-1)))
-
-
 def _orthomin(
     cycle: _Cycle, r: Array, beta: float, goal: float
 ) -> tuple[Array, int, float]:
@@ -298,14 +293,14 @@ def _orthomin(
         for k in range(len(ways)):
             if k == now or not sizes[k] > 0:
                 continue
-            share = -_dot(products[k], product) / sizes[k]
+            share = -dot(products[k], product) / sizes[k]
             add_scaled(share, ways[k], way)
             add_scaled(share, products[k], product)
-        sizes[now] = _dot(product, product)
+        sizes[now] = dot(product, product)
         count += 1
         if not 0 < sizes[now] < np.inf:
             break
-        rest = advance(z, r, _dot(product, r) / sizes[now], way, product)
+        rest = advance(z, r, dot(product, r) / sizes[now], way, product)
         if count >= EARLY and not rest <= SLOW**count * beta:
             break
     return z, count, rest

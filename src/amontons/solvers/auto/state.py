@@ -35,7 +35,7 @@ MOMENTUM_CONTACT = 4.0
 PRODUCT = 5.4
 NEWTON_CONTACT = 500.0
 DENSE_STEP = 0.05  # per cube of the unknowns
-LIGHT = 1e6  # nanoseconds of a step up to which faces are not worth being looked for
+LIGHT = 1e6  # nanoseconds of a step up to which its cost is told without looking for faces
 DENSE = 0.5  # share of blocks of W above which it comes from a mesh
 FEW = 30  # contacts up to which W may be full as all are on one rigid body
 

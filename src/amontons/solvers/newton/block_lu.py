@@ -16,7 +16,6 @@ from numpy.typing import NDArray
 
 from ...core.compiled import njit
 from ...core.copies import copy_inplace
-from ...linear.blocks import BlockRows
 from ...problem.friction import FrictionProblem
 
 Index = NDArray[np.int32]
@@ -58,12 +57,7 @@ class Symbolic:
 
 
 def _analyse(problem: FrictionProblem) -> Symbolic:
-    return analyse(problem.blocks)
-
-
-def analyse(blocks: BlockRows) -> Symbolic:
-    """The same of block rows."""
-    return analyse_pattern(blocks.indptr, blocks.indices)
+    return analyse_pattern(problem.blocks.indptr, problem.blocks.indices)
 
 
 def analyse_pattern(indptr: Index, indices: Index) -> Symbolic:

@@ -64,14 +64,14 @@ def scaled_blocks_inplace(x, y, mu, shift, i, beta, w, lam, E, inverse):
         E[i] = inverse[i] = 0.0
         E[i, 0, 0], inverse[i, 0, 0] = most, 1.0 / most
         return
-    for block, p, r, c, scale in (
+    for block, p, r, c, unit in (
         (E[i], most, least, across, mu),
         (inverse[i], 1.0 / most, 1.0 / least, 1.0 / across, 1.0 / mu),
     ):
         mean, half = 0.5 * (p + r), 0.5 * (p - r)
-        block[0, 0] = mean * scale * scale
-        block[0, 1] = block[1, 0] = half * n * scale
-        block[0, 2] = block[2, 0] = half * m * scale
+        block[0, 0] = mean * unit * unit
+        block[0, 1] = block[1, 0] = half * n * unit
+        block[0, 2] = block[2, 0] = half * m * unit
         block[1, 1] = mean * n * n + c * m * m
         block[2, 2] = mean * m * m + c * n * n
         block[1, 2] = block[2, 1] = (mean - c) * n * m
@@ -113,8 +113,8 @@ def residual_inplace(x, y, u, s, mu, able, rho, residual):  # noqa: PLR0913
         if able[i] <= 0.0:
             continue
         count += 1
-        scale = 1.0 / mu[i] if mu[i] > 0.0 else 1.0
-        residual[i, 0] = y[i, 0] - scale * u[i, 0] - s[i]
+        unit = 1.0 / mu[i] if mu[i] > 0.0 else 1.0
+        residual[i, 0] = y[i, 0] - unit * u[i, 0] - s[i]
         for a in range(1, 3):
             residual[i, a] = y[i, a] - u[i, a] if mu[i] > 0.0 else 0.0
         for a in range(3):

@@ -55,22 +55,24 @@ def creeping(
     """
     firmness, steps, size = FIRMNESS, 0, np.linalg.norm(problem.residual(v))
     while firmness >= WEAK and not target.deadline.passed:
-        found, count = yield from _slowed(problem.held(v, firmness), v, halvings, linear)
+        held = problem.held(v, firmness)
+        found, count = yield from _slowed(held, v, halvings, linear, target)
         steps += count
         if found is None:
             firmness *= STIFFER
         else:
             v, last, size = found, size, np.linalg.norm(problem.residual(found))
             if size <= RISES * last:
-                firmness *= SOFTER * float(np.clip(size / last, LEAST, 1.0))
-        if firmness > STIFFEST or steps > MOST:
+                falls = float(size / last) if last > 0 else LEAST
+                firmness *= SOFTER * min(max(falls, LEAST), 1.0)
+        if firmness > STIFFEST or (steps > MOST and firmness >= WEAK):
             raise Failed("bodies that creep do not come to rest")
 
 
 def _slowed(
-    held: NonlinearProblem, v: Array, halvings: int, linear: LinearSteps
+    held: NonlinearProblem, v: Array, halvings: int, linear: LinearSteps, target: Target
 ) -> Generator[Array, None, tuple[Array | None, int]]:
-    """(a solution of (1) to INNER, or None; Newton steps)."""
+    """(a solution of (1) to INNER, or None, also at the deadline; Newton steps)."""
     states, damped, count = held.states(v), 0, 0
     w = states.start
     goal = INNER * np.linalg.norm(states.residual(w))
@@ -89,6 +91,6 @@ def _slowed(
         damped += length < 0.5
         if size <= goal:
             return states.v(w), count
-        if damped >= DAMPED:
+        if damped >= DAMPED or target.deadline.passed:
             break
     return None, count

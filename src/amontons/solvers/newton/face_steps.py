@@ -32,7 +32,7 @@ STIFF = 1e13  # D^-1 at most, of the largest entry of X
 
 @njit(cache=True, error_model="numpy")
 def _triangle_inplace(G, rank, stiffest, B, order, stiffness):
-    """B, the order of its rows and D^-1 of G (6, 6), of which the lower half is overwritten."""
+    """B, the order of its rows and D^-1 of G (6, 6), which is overwritten."""
     for k in range(SIX):
         order[k] = k
     B[:] = 0.0

@@ -57,7 +57,7 @@ from .cone_steps import (
 )
 from .face_steps import face_memory, factorise_faces_inplace, step_by_faces_inplace
 from .faces import NONE
-from .smoothing import PINNED, Workspace
+from .smoothing import IDLE, PINNED, Workspace
 
 Array = NDArray[np.float64]
 Index = NDArray[np.int64]
@@ -95,7 +95,7 @@ def _scalings_inplace(faces, x, y, mu, rho, shift, scaling, extra, turned):  # n
     for i in range(len(mu)):
         if rho[i] <= 0.0:
             for a in range(3):
-                extra[i, a, a] = 1e300
+                extra[i, a, a] = IDLE
         elif sharing and faces.face[i] >= 0:
             scaled_blocks_inplace(x, y, mu[i], shift / rho[i], i, beta, w, lam, extra, turned)
         else:
@@ -232,9 +232,13 @@ class InteriorPoint:
     ) -> tuple[int, Array]:
         """(steps, r) of the relaxation with frozen |u_T|, (nc,); goal: error, unit of u."""
         relaxation, done = Relaxation.of(work, slip, self.shift), 0
-        most = work.affordable(self.steps, deadline)
-        while done < most and not relaxation.ended:
-            done += relaxation.advance(goal, most - done)
+        while done < self.steps and not relaxation.ended:
+            products = work.sharing.products if relaxation.shares else None
+            done += relaxation.advance(
+                goal, work.affordable(self.steps - done, deadline, products)
+            )
+            if deadline.passed:
+                break
         return max(done, 1), relaxation.r
 
 
@@ -269,7 +273,7 @@ class Relaxation:
         to its last.
         """
         sharing = self.work.sharing
-        self.shares = self.shares and sharing.faces is not NONE
+        self.shares = self.shares and len(sharing.faces.first) > 1
         arrays = sharing.arrays if self.shares else (*self.work.symbolic.arrays, NONE)
         done = relax_inplace(
             *self.work.problem.kernel_data, *arrays, self.r, self.x, self.y, self.slip,

@@ -4,8 +4,8 @@ The problem is F(v) = 0, piecewise smooth, with a linearisation at every admissi
 `model.large_deformation`.  It is tried at full load at once; where that fails the load grows in
 steps from a state that is known, each begun by one of `predictors`: where Newton's method fails
 from one the next is tried.  `step_lengths` says how far steps go.  Where two bodies slide, and
-no part of a step passes the test, bodies creep on (`creeping`), if a state under load is known
-from which they come: from rest a smaller load says more.
+no part of a short load step's Newton steps passes the test, bodies creep on (`creeping`), if a
+state under load is known from which they come: from rest a smaller load says more.
 """
 
 from __future__ import annotations
@@ -32,6 +32,8 @@ from .step_lengths import Failed, by_natural_test, by_residual
 Array = NDArray[np.float64]
 LOOSE = 1e-5  # error, unit-free, at which a load step is good enough to go on
 REPEATED = 1e-12  # relative difference of |F| below which steps go round in circles
+SHORT = 1 / 16  # of the load: steps up to which bodies creep, others are cut first
+CREPT = "over a jump, to where bodies creep"
 JUMP = "; if the body jumps there, crossing=PathCrossing() of this solver follows it"
 EASY = 8  # Newton steps up to which the next load step may be longer
 
@@ -134,7 +136,7 @@ class NonlinearNewton:
         if start.v is not None:
             try:
                 states = problem.states(start.v)
-                yield from shown.best(self._newton(problem, states, target, linear))
+                yield from shown.best(self._newton(problem, states, target, linear, shown))
             except (Failed, InvertedCells):
                 pass  # the start was no help
         share, step, reason = 0.0, 1.0, ""
@@ -143,7 +145,7 @@ class NonlinearNewton:
             if step < self.smallest_share:
                 if self.crossing is not None:
                     v, told = self.crossing.across(problem, share, v, target)
-                    found = self._newton(problem, problem.states(v), target, linear)
+                    found = self._newton(problem, problem.states(v), target, linear, shown)
                     yield from shown.best(found, told)
                 hint = "" if self.crossing is not None else JUMP
                 if remark := problem.at_share(share).remark(v):
@@ -151,17 +153,19 @@ class NonlinearNewton:
                 raise Breakdown(
                     f"no equilibrium found beyond {share:.4g} of the load: {reason}{hint}"
                 )
-            goal, creeps = min(1.0, share + step), share > 0 or bool(problem.known_state.any())
+            goal, loaded = min(1.0, share + step), share > 0 or bool(problem.known_state.any())
+            creeps = self.crossing is None and loaded and step <= SHORT
+            shown.brief = self.crossing is None and loaded and step > SHORT
             for predict in predictors(problem):
                 try:
                     first = predict(problem, share, goal, v, target, linear)
                     if goal == 1.0:
                         states = problem.states(first, (problem.at_share(share), v))
-                        found = self._newton(problem, states, target, linear, creeps)
+                        found = self._newton(problem, states, target, linear, shown, creeps)
                         yield from shown.best(found)
                     then = problem.at_share(goal)
                     states = then.states(first, (problem.at_share(share), v))
-                    found = self._newton(then, states, target, linear, creeps)
+                    found = self._newton(then, states, target, linear, shown, creeps)
                     before = shown.waiting
                     v = shown.reached(found, then, states.v(states.start))
                     break
@@ -175,7 +179,7 @@ class NonlinearNewton:
 
     def _newton(
         self, problem: NonlinearProblem, states: States, target: Target, linear: LinearSteps,
-        creeps: bool = False,
+        shown: _Shown, creeps: bool = False,
     ) -> Iterator[tuple[Array, Array, float]]:  # fmt: skip
         """(v, r, |F| one step before) of Newton steps; Failed when they lead nowhere.
 
@@ -202,6 +206,8 @@ class NonlinearNewton:
                 length, goes = by_natural_test(problem, states, w, step, factor, self.halvings)
             else:
                 length = by_residual(states, w, step, sizes, self.halvings)
+            if not goes and shown.brief:
+                raise Failed("no part of a Newton step leads nearer")
             if goes or not creeps:
                 w = w + length * step
                 yield states.v(w), problem.reactions(states.v(w)), size
@@ -209,7 +215,7 @@ class NonlinearNewton:
             for way in creeping(problem, v, self.halvings, linear, target):
                 yield way, problem.reactions(way), np.inf
                 w = problem.states(way).start
-            creeps = False
+            creeps, shown.note = False, CREPT
             sizes, patience = [], Patience(self.patience)
         raise Breakdown("out of time between two load steps")
 
@@ -228,6 +234,8 @@ class _Shown:
 
     size: float = np.inf
     waiting: int = 0
+    brief: bool = False
+    note: str = ""  # what happened on the way
 
     def best(
         self, steps: Iterator[tuple[Array, Array, float]], told: str = ""
@@ -236,7 +244,7 @@ class _Shown:
         for v, r, size in steps:
             self.waiting += 1
             if size < self.size:
-                yield Iterate(r, v, self.waiting, self.waiting, told)
+                yield Iterate(r, v, self.waiting, self.waiting, told or self.note)
                 self.size, self.waiting = size, 0
 
     def reached(

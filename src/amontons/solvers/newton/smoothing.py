@@ -50,6 +50,7 @@ from .faces import FaceMatrix
 
 Array = NDArray[np.float64]
 PINNED = 1e16  # relative stiffness that keeps r_T = 0 where mu = 0
+IDLE = 1e100  # stiffness of a contact that can not react: its cube is a number
 PRODUCT_SECONDS = 1e-8  # of a product of 3x3 blocks in a factor, on a slow core
 SMALLEST = 1e-18  # smoothing relative to |q|, far below rounding; smaller ones become denormal
 
@@ -104,7 +105,7 @@ def _assemble(r, u, mu, rho, sigma, shift, prox, extra, rhs):  # noqa: PLR0913
         d = extra[i]
         d[:, :] = 0.0
         if rho[i] <= 0.0:  # W_ii = 0: this contact can not react
-            d[0, 0] = d[1, 1] = d[2, 2] = 1e300
+            d[0, 0] = d[1, 1] = d[2, 2] = IDLE
             rhs[i, :] = 0.0
             continue
         f0, f1, f2, a1, b1, a2, b2, c, s = _smoothed(r, u, mu[i], rho[i], sigma, i)
@@ -301,15 +302,14 @@ class Workspace:
         """Faces that contacts share, for steps of interior points."""
         return FaceMatrix.of(self.problem)
 
-    @property
-    def step_seconds(self) -> float:
-        """Of a Newton step, roughly."""
-        return PRODUCT_SECONDS * (1 + self.symbolic.products)
+    def affordable(self, steps: int, deadline: Deadline, products: int | None = None) -> int:
+        """Steps of one compiled call that still fit before a deadline, one at least.
 
-    def affordable(self, steps: int, deadline: Deadline) -> int:
-        """Steps of one compiled call that still fit before a deadline, one at least."""
-        left = deadline.left
-        return steps if math.isinf(left) else max(1, min(steps, int(left / self.step_seconds)))
+        products: of blocks in a step, by default in one with the whole factor.
+        """
+        left, whole = deadline.left, self.symbolic.products
+        each = PRODUCT_SECONDS * (1 + (whole if products is None else products))
+        return steps if math.isinf(left) else max(1, min(steps, int(left / each)))
 
     def newton(  # noqa: PLR0913
         self, x: Array, sigma: float, options: SmoothingNewton, *, goal: float, steps: int,

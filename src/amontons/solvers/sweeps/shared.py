@@ -1,7 +1,9 @@
 """Sweeps over large problems in several threads: the loops of `kernels`, step by step.
 
-Each gives what the compiled loop of the same name gives, to the last bit: threads share the
-visits of a sweep only (`chunks`), all else is done by the same compiled functions.
+Threads share the visits of a sweep (`chunks`) and the vectors of Anderson's mixing (`mixing`).
+Small problems go through the compiled loops of the same names.  Which of both it is depends on
+the problem alone, not on the number of threads: compiled into another loop, sums may be formed
+in another order.
 """
 
 from __future__ import annotations
@@ -12,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...core.compiled import njit
-from ...core.threads import Range, over_blocks, shared, split, threads
+from ...core.threads import Range, over_blocks, shared, split
 from .chunks import SUMMED, stages_of
 from .kernels import (
     Sweep,
@@ -55,11 +57,8 @@ class SharedSweep:
 
     @classmethod
     def of(cls, s: Sweep) -> SharedSweep | None:
-        """None where one thread does the sweeps, in compiled loops."""
-        if threads() < 2 or len(s.work) < 3:
-            return None
-        made = cls(s)
-        return made if any(len(stage) > 1 for stage in made.stages) else None
+        """None where there is nothing to share."""
+        return None if len(s.work) < 3 else cls(s)
 
     def __call__(self, r: Array) -> float:
         """Sweep on r (nc, 3); the change."""
