@@ -33,6 +33,7 @@ REFUSED, HARMLESS, WRONG, CRASHED = "refused", "harmless", "wrong", "crashed"
 RESULTS = Path(__file__).parent / "results"
 CURVED = 3  # contacts in 3D of which lists and branches are asked, at most
 LISTS, LOADS, FRICTION = (0, 1), (2, 5), (9,)  # seeds modulo 16 of these kinds
+PROCESSES = 2
 LIMIT = 20  # seconds of a search, counted in operations: the same on every machine
 
 
@@ -66,6 +67,7 @@ def write(problem: am.FrictionProblem, seed: int, path: Path) -> str:
     if kind in LOADS + FRICTION:
         random = np.random.default_rng(seed)
         factor = random.uniform(0.5, 1.5) if kind in FRICTION else 1.0
+        assert problem.W is not None  # of problems made from one
         end = am.FrictionProblem.from_delassus(
             problem.W, random.standard_normal(shape), factor * np.array(problem.mu)
         )
@@ -77,6 +79,20 @@ def write(problem: am.FrictionProblem, seed: int, path: Path) -> str:
     return am.write_certificate(problem, verdict, path)
 
 
+def made(path: Path) -> tuple[str, float | None]:
+    """(what was written for the seed that a file is named after, CPU seconds of its check)."""
+    seed = int(path.stem)
+    problem = problem_of(seed)
+    try:
+        claim = write(problem, seed, path)
+    except am.InvalidInput as reason:
+        print(seed, str(reason)[:150], flush=True)
+        return f"{problem.dimension}D without a certificate", None
+    began = time.process_time()
+    am.check_certificate(path)  # raises where it is refused
+    return f"{problem.dimension}D {claim}", time.process_time() - began
+
+
 def main() -> None:
     """Write, check, forge, and a page of what came out."""
     parser = argparse.ArgumentParser(description=__doc__)
@@ -84,24 +100,21 @@ def main() -> None:
     parser.add_argument("--forgeries", type=int, default=10000)
     asked = parser.parse_args()
     count: Counter[str] = Counter()
-    seconds, files, seed = [], [], 0
-    with tempfile.TemporaryDirectory() as folder:
-        while len(files) < asked.certificates:
-            number, seed = seed, seed + 1
-            problem, path = problem_of(number), Path(folder) / f"{number}.h5"
-            try:
-                claim = write(problem, number, path)
-            except am.InvalidInput as reason:
-                count[f"{problem.dimension}D without a certificate"] += 1
-                print(number, str(reason)[:150], flush=True)
-                continue
-            began = time.process_time()
-            am.check_certificate(path)  # raises where it is refused
-            seconds.append(time.process_time() - began)
-            count[f"{problem.dimension}D {claim}"] += 1
-            files.append(path)
-            if len(files) % 50 == 0:
-                print(len(files), time.process_time(), dict(count), flush=True)
+    seconds: list[float] = []
+    files: list[Path] = []
+    pool = ProcessPoolExecutor(PROCESSES, get_context("spawn"))
+    with tempfile.TemporaryDirectory() as folder, pool:
+        seed = 0
+        while (lacking := asked.certificates - len(files)) > 0:
+            paths = [Path(folder) / f"{seed + k}.h5" for k in range(lacking)]
+            for path, (claim, spent) in zip(paths, pool.map(made, paths), strict=True):
+                count[claim] += 1
+                if spent is not None:
+                    seconds.append(spent)
+                    files.append(path)
+                if sum(count.values()) % 50 == 0:
+                    print(len(files), dict(count), flush=True)
+            seed += lacking
         told = forge(files, asked.forgeries, Path(folder) / "forged.h5")
     rows = "\n".join(f"| {name} | {number} |" for name, number in sorted(count.items()))
     where = describe()
