@@ -291,7 +291,8 @@ def _on_face(  # noqa: PLR0913
     for c in range(begin, end):
         p = v[corners[c]]
         q = v[corners[c + 1 if c + 1 < end else begin]]
-        out = cross(q - p, normal)
+        out = np.empty(3)
+        out[0], out[1], out[2] = cross(q - p, normal)
         out = out / np.sqrt(dot(out, out))
         number, side = 0, PLACES // 4 + 256 * (c - begin)
         for k in range(size):
