@@ -2,12 +2,12 @@
 
     python benchmarks/certificate_files.py [--certificates 1000] [--forgeries 10000]
 
-Random problems of two to six contacts in 2D and 3D, in turn: every load and one load; all
-solutions of a load and all branches between two loads, in 3D of up to three contacts and also
-where friction changes.  Where lists and branches are asked for, W couples normals with
-tangents, so that several solutions are likely.  Each forgery changes one byte of one of the
-files at random; one counts as accepted where the checker still agrees while W, q, mu, r0, the
-claim or anything else that the hash covers is another.
+Random problems of two to six contacts in 2D and 3D, in turn, in 3D one to three where lists and
+branches are asked: every load and one load; all solutions of a load and all branches between
+two loads, in 3D also where friction changes.  Where lists and branches are asked for, W couples
+normals with tangents, so that several solutions are likely.  Each forgery changes one byte of
+one of the files at random; one counts as accepted where the checker still agrees while W, q,
+mu, r0, the claim or anything else that the hash covers is another.
 """
 
 from __future__ import annotations

@@ -5,6 +5,7 @@ import pytest
 from scipy.optimize import minimize_scalar
 
 import amontons as am
+from amontons.analysis.certificates import slip_arcs
 from amontons.analysis.certificates.energy_bound import energy_bound
 from amontons.analysis.certificates.older_criteria import critical_discs
 from amontons.core.clock import Deadline
@@ -219,3 +220,11 @@ def test_any_friction_is_safe_where_nothing_can_react(ask, d):
     found = ask(empty)
     assert found.lower == found.upper == np.inf
     assert "no contact" in found.reason
+
+
+@pytest.mark.parametrize("M", [[[1, -2], [-3, 1]], [[1, -1], [-1, 1]], [[1, -2], [-0.5, 1]]])
+def test_reactions_of_a_part_that_fails(M):
+    """Also where it is singular, at the threshold itself."""
+    rho = slip_arcs._opposed(np.array(M, dtype=float))
+    assert (rho > 0).all()
+    assert (M @ rho <= 1e-12 * rho.max()).all()

@@ -214,3 +214,22 @@ def test_slopes_of_surfaces_that_face_nothing_are_those_of_the_normals_alone():
     np.testing.assert_allclose(slopes.normals @ way.ravel(), turned.ravel() / (2 * STEP),
                                atol=1e-6)  # fmt: skip
     assert slopes.motion(here).nnz == 0  # there is nobody to move against
+
+
+@pytest.mark.parametrize("split", [(False, False), (True, True)])
+@pytest.mark.parametrize("side", ["slave", "master"])
+def test_facets_that_are_points_have_finite_slopes(side, split):
+    """Nodes of a corner of a surface all in one place: no division by a size of nothing."""
+    pair, rest = surfaces(split=split)
+    earlier, x, skin = aside(pair, rest), rest.copy(), getattr(pair, side)
+    shrunk = skin.nodes[(rest[skin.nodes, :2].max(axis=1) < 0.75).all(axis=1)]
+    x[np.unique(shrunk)] = x[shrunk[0, 0]]
+    force = np.ones((len(pair.slaves), 3))
+    with np.errstate(divide="raise", invalid="raise"):
+        here = pair.at(x)
+        slopes = here.slopes
+        values = told(here, earlier, force) + [each.toarray() for each in (
+            slopes.normals, slopes.distances, slopes.gap, slopes.spread(force),
+            here.couples.slopes(force), slopes.motion(earlier))]  # fmt: skip
+    assert here.met.any()
+    assert all(np.isfinite(each).all() for each in values)

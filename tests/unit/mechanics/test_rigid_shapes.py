@@ -298,3 +298,9 @@ def test_a_film_shows_bodies_where_they_are(tmp_path):
     marked = [len(line.get_xdata()) for line in figure.axes[0].get_lines()]
     assert marked == [int((steps[-1].status == status).sum()) for status in am.ContactStatus]
     assert sum(marked) == len(steps[-1].r) > 0
+    axes = figure.axes[0]
+    for line in axes.get_lines():
+        for places, (low, high) in ((line.get_xdata(), axes.get_xlim()),
+                                    (line.get_ydata(), axes.get_ylim())):  # fmt: skip
+            assert all(low <= place <= high for place in places)
+    assert np.ptp(axes.get_xlim()) == axes.get_images()[0].get_size()[1]  # nothing grew

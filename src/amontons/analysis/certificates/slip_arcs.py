@@ -229,7 +229,17 @@ def point_threshold(
     if len(chosen) == 1:
         rho[chosen] = 1.0
     elif chosen:
-        inverse = np.linalg.inv(M[np.ix_(chosen, chosen)])  # <= 0
-        values = np.abs(inverse).sum(axis=1)
+        values = _opposed(M[np.ix_(chosen, chosen)])
         rho[chosen] = values / values.max()
     return t, rho
+
+
+def _opposed(M: Array) -> Array:
+    """rho >= 0 with M rho <= 0, of a least part M that fails, to rounding.
+
+    All smaller parts pass, so that the inverse has no entry > 0, or the kernel is of one sign.
+    """
+    try:
+        return np.abs(np.linalg.inv(M)).sum(axis=1)
+    except np.linalg.LinAlgError:  # at the threshold itself
+        return np.abs(np.linalg.svd(M)[2][-1])

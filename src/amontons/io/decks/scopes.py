@@ -85,7 +85,7 @@ class Scope:
         return self._named(text, row, "element")
 
     def acted_on(self, text: str, row: Row, what: str = "node") -> Index:
-        """The same, of "node" or "element", by a card that does nothing to an empty set.
+        """The same, of "node" or "element", by a card that would do nothing to an empty set.
 
         Raises FileFormatError for one: the support or load that is meant would be missing.
         """

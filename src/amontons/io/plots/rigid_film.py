@@ -64,11 +64,12 @@ def _figure(step: RigidStep, pixels: NDArray[np.uint8], met: Array, units: Units
     sheet = Sheet(8.4, 5.6, title=title, note=stamp, rows=1)
     axes = sheet.panel(0.4, 0.05, *SIZE)
     axes.imshow(pixels, origin="lower", interpolation="none")
+    axes.autoscale(False)
     axes.set_axis_off()
     labels = {s: f"{s.name.lower()}: {int((step.status == s).sum())}" for s in ContactStatus}
     marks = status_marks(labels)
     for mark, status in zip(marks, ContactStatus, strict=True):
-        axes.plot(*met[step.status == status].T, linestyle="", marker=mark.get_marker(),
+        axes.plot(*(met[step.status == status] - 0.5).T, linestyle="", marker=mark.get_marker(),
                   color=mark.get_color(), markeredgecolor=mark.get_markeredgecolor(),
                   markersize=4, clip_on=False)  # fmt: skip
     sheet.legend(marks, len(marks))

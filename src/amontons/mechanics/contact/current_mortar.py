@@ -61,7 +61,7 @@ from scipy import sparse
 from ...linear.sums import sum_of_blocks, sum_of_products
 from .couples import Couples
 from .current_slopes import MortarSlopes
-from .facing import Skin
+from .facing import Skin, shapes
 from .fading import Fading
 from .folds import Fold
 from .newcomers import Newcomers
@@ -308,8 +308,7 @@ class MortarMeeting:
         """d of (3'), (nc, d)."""
         parts, n, row = self.shared, self.normals, self.rows[self.shared.of]
         opened = np.where(self.met, np.maximum(self.gap, 0.0), 0.0)
-        areas = self.pair.master.areas(self.x)
-        facing = areas / np.linalg.norm(areas, axis=1)[:, None]
+        _, facing, _ = shapes(self.pair.master, self.x)
         share = (parts.psi[parts.of] @ parts.cross).sum(axis=2)
         theirs, kept = np.zeros(n.shape), row >= 0
         np.add.at(theirs, row[kept], (share[:, :, None] * facing[parts.master][:, None])[kept])

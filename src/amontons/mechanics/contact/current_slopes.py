@@ -134,6 +134,7 @@ class MortarSlopes:
         (skin, heeded), n = self.at.pair.around, self.at.normals
         (f, a), (nc, d) = skin.nodes.shape, n.shape
         length = np.linalg.norm(self.at.sums, axis=1)
+        length = np.where(length > 0, length, 1.0)
         project = (np.eye(d) - n[:, :, None] * n[:, None, :]) / length[:, None, None]
         project = project * self.at.pair.free[:, None, :]
         share = -skin.area_slopes(self.at.x).reshape(f, 1, d, a * d)

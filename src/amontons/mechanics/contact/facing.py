@@ -213,7 +213,7 @@ def candidates(slave: Skin, master: Skin, x: Array) -> tuple[Index, Index]:
     tree = cKDTree(x[nodes])
     foot, beside = feet(centre, normal, tree, normals[nodes])
     reach = 2 * radius + beside
-    label = np.floor(np.log2(size))
+    label = np.floor(np.log2(np.maximum(size, np.finfo(float).tiny)))
     of, other = [], []
     for value in np.unique(label):
         members = np.flatnonzero(label == value)

@@ -26,9 +26,11 @@ while open, `closing`, is taken off z_T as (2) has it: for w = 0 off the mean fo
 that is a given number would stay whole however little faces a node: Tresca's law does not fade.
 
 Where the master ends with a facet kappa_s is 1/2, at a corner of quadrilaterals 5/12: such
-nodes bear whole, and FULL is less.  How much of a node beyond the end bears tells how wide the
-master acts: a stiff block that ends within facets of a slab, the slave, is pressed on it with
-the same force to .1 to .5 % wherever it ends; with FULL = .2 and .5 to 3 and 1.3 %.
+nodes bear whole, and FULL is less.  That holds for even meshes; kappa_s is 1/3 where the facet
+beyond is twice as long, or at a corner with one of six triangles, and such nodes fade a little.
+How much of a node beyond the end bears tells how wide the master acts: a stiff block that ends
+within facets of a slab, the slave, is pressed on it with the same force to .1 to .6 % wherever
+it ends; with FULL = .2 and .5 to 3 and 1.3 %.
 """
 
 from __future__ import annotations

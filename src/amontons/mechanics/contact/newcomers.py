@@ -114,6 +114,7 @@ class Newcomers:
         there = dofs_of(facets.nodes, d)
         areas = facets.areas(self.at.x)
         size = np.linalg.norm(areas, axis=1)
+        size = np.where(size > 0, size, 1.0)
         n = areas / size[:, None]
         across = (np.eye(d) - n[:, :, None] * n[:, None, :]) * (h / size)[:, None, None]
         turned = across @ facets.area_slopes(self.at.x).reshape(k, d, -1)

@@ -30,6 +30,8 @@ class HeldParts:
         return cast(NonlinearParts, cls(parts, firmness, u))
 
     def __getattr__(self, name: str) -> Any:
+        if name == "_parts":  # of copies that are not filled yet
+            raise AttributeError(name)
         return getattr(self._parts, name)
 
     def forces(self, u: Array, pressures: Array | None = None) -> Array:

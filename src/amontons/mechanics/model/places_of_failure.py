@@ -40,7 +40,8 @@ def _parted(now: Meetings, earlier: Meetings) -> Iterator[str]:
             yield f"{names} nowhere: no contact force holds anything there"
         elif len(left):
             place = ", ".join(f"{c:.4g}" for c in here.x[here.slaves[left[0]]])
-            yield f"{names} hardly or no more at {len(left)} nodes, as at ({place})"
+            less = f"by less than half, or no more, at {len(left)} nodes"
+            yield f"{names} {less}, as at ({place})"
 
 
 def _flat(parts: NonlinearParts, u: Array) -> Iterator[str]:

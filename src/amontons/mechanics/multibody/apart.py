@@ -22,12 +22,10 @@ def dot(a, b):
 
 @njit(cache=True, error_model="numpy")
 def cross(a, b):
-    """The product of two vectors (3,): numpy's takes seconds to compile."""
-    out = np.empty(3)
-    out[0] = a[1] * b[2] - a[2] * b[1]
-    out[1] = a[2] * b[0] - a[0] * b[2]
-    out[2] = a[0] * b[1] - a[1] * b[0]
-    return out
+    """a x b, three numbers; written out, as numpy's takes seconds to compile."""
+    return (
+        a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]
+    )  # fmt: skip
 
 
 @njit(cache=True, error_model="numpy")

@@ -261,17 +261,24 @@ def _polyhedra(  # noqa: PLR0913
 
 
 @njit(cache=True, error_model="numpy")
+def _against(first_face, n, j, normal):
+    """The face of j that looks against a normal."""
+    against, lowest = -1, np.inf
+    for f in range(first_face[j], first_face[j + 1]):
+        cosine = dot(n[f], normal)
+        if cosine < lowest:
+            against, lowest = f, cosine
+    return against
+
+
+@njit(cache=True, error_model="numpy")
 def _on_face(  # noqa: PLR0913
     count, i, j, face, first_vertex, v, first_face, n, o, first_corner, corners, margin,
     numbers, places,
 ):  # fmt: skip
     """The face of j that looks against one of i, cut by the sides of that; j is the slave."""
     normal, offset = n[face], o[face]
-    against, lowest = -1, np.inf
-    for f in range(first_face[j], first_face[j + 1]):
-        cosine = dot(n[f], normal)
-        if cosine < lowest:
-            against, lowest = f, cosine
+    against = _against(first_face, n, j, normal)
     begin, end = first_corner[face], first_corner[face + 1]
     room = first_corner[against + 1] - first_corner[against] + end - begin + SPARE
     polygon, cut = np.empty((room, 3)), np.empty((room, 3))
@@ -284,7 +291,8 @@ def _on_face(  # noqa: PLR0913
     for c in range(begin, end):
         p = v[corners[c]]
         q = v[corners[c + 1 if c + 1 < end else begin]]
-        out = cross(q - p, normal)
+        out = np.empty(3)
+        out[0], out[1], out[2] = cross(q - p, normal)
         out = out / np.sqrt(dot(out, out))
         number, side = 0, PLACES // 4 + 256 * (c - begin)
         for k in range(size):

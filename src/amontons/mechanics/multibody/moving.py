@@ -19,8 +19,8 @@ was mended takes part, though rotations open it by their squares.  (A law that l
 contacts close without overlap, u1_N >= -gap / h, turns a rocking block round a step too early
 at each impact; at the same step its times are wrong by six times as much.)
 
-Joints take back beyond the middle what they turned away from before it: with u_m of the
-velocities before the step and arms at its middle, u_b with those at its beginning,
+Joints take back beyond the middle what they turned away from before it: with u_m of v0 and
+W_f with arms at the middle of the step, u_b of v0 and W0 with those at its beginning,
 
     u1 = -(1 - c) u_m,    c = u_b . u_m / |u_m|^2 between 0 and 1, for joints that hang together
 
@@ -72,6 +72,7 @@ Array = NDArray[np.float64]
 Index = NDArray[np.int64]
 WHOLE = 1e-9  # the end may miss a whole number of steps by this part of a step
 OVERLAP = 1e-5  # of the smallest body, below which overlaps are left
+MENDED = 1e-6  # error of a mending that is let pass: what it leaves is mended in the next step
 FAR = 1e-3  # of the smallest body, moved by mending, from which contacts are found again
 TOUCHING = 1e-9  # of a body, gaps up to which it touches
 NOTHING = np.zeros((0, 3))
@@ -190,7 +191,7 @@ class _Stepping:
         begin, masses = before.position, self.bodies[0]
         middle = middle_of(*before, h)
         at = self._rows(*middle)
-        mended = self._mended(at, middle[1])
+        mended = self._mended(at, middle[1], f"step {state.index + 1}", deadline)
         if mended is not None:
             moved, gaps = mended
             before = self._shifted(before, moved, rotations(before.orientation))
@@ -321,22 +322,29 @@ class _Stepping:
         return self._driven(problem, np.hstack([posed.start, moments]), what, deadline)
 
     def _driven(
-        self, problem: Problem, start: Array, what: str, deadline: Deadline
-    ) -> FrictionSolution:
-        """What the solvers find from a start (n, d); raises NotConverged where asked to."""
+        self, problem: Problem, start: Array, what: str, deadline: Deadline,
+        enough: float = 0.0,
+    ) -> FrictionSolution:  # fmt: skip
+        """What the solvers find from a start (n, d); raises NotConverged where asked to.
+
+        enough: an error that does where the tolerance is not reached.
+        """
         asked = self.asked
         asked = asked if deadline is NEVER else replace(asked, time_limit=deadline)
         solution = drive_as_asked(problem, asked, Iterate(start), self.solver)
-        if self.check and not solution.converged:
-            record = solution.convergence
+        record = solution.convergence
+        missed = not solution.converged and (record.by_user or record.error > enough)
+        if self.check and missed:
             kind = Interrupted if record.by_user else NotConverged
             raise kind(f"{what}: {record}. {record.advice}", solution)
         return solution
 
-    def _mended(self, at: _Met, R: Array) -> tuple[tuple[Array, Array], Array] | None:
+    def _mended(
+        self, at: _Met, R: Array, what: str, deadline: Deadline
+    ) -> tuple[tuple[Array, Array], Array] | None:
         """Displacements and rotations (n, 3) that take overlaps away, and the gaps then.
 
-        None where overlaps are small.
+        None where overlaps are small.  `what` for messages.
         """
         if at.deepest <= self.overlap:
             return None
@@ -353,7 +361,8 @@ class _Stepping:
             posed = posed._replace(start=start)
         if found is None:
             problem = posed.problem(law_of(nc, len(q) - nc, 0.0))
-            found = drive_as_asked(problem, self.asked, Iterate(posed.start), self.solver)
+            what = f"{what}, overlaps to be mended"
+            found = self._driven(problem, posed.start, what, deadline, MENDED)
         push, turn = impulses(rows, found.r, len(masses))
         moved = push / masses[:, None], np.einsum("bij,bj->bi", inverse, turn)
         return moved, found.u[:nc, 0] - 0.5 * self.overlap

@@ -107,8 +107,8 @@ def pose(rows, contacts, bodies, motion, free, restitution, keys, state):  # noq
     """The problem of a step, as the arrays of `Posed`.
 
     rows: see `Rows`; contacts: how many are no joints.  bodies: masses (b,), inverse inertia
-    and R (b, 3, 3); motion: v and W before the step, free: those after it without reactions,
-    W in own axes.  keys (contacts, 3); state: keys and impulses of the last step.
+    and R (b, 3, 3); motion: v before the step and W_f, free: v and W_f without reactions, W in
+    own axes.  keys (contacts, 3); state: keys and impulses of the last step.
     """
     slave, master, axes, arms, master_arms = rows
     masses, own_inverse, R = bodies
@@ -119,8 +119,6 @@ def pose(rows, contacts, bodies, motion, free, restitution, keys, state):  # noq
         _turned_vector(R[b], free[1][b], omega[b])
     q = row_velocities(slave, master, axes, arms, master_arms, free[0], omega)
     if restitution > 0.0 and contacts > 0:
-        for b in range(count):
-            _turned_vector(R[b], motion[1][b], omega[b])
         before = row_velocities(slave, master, axes, arms, master_arms, motion[0], omega)
         for i in range(contacts):
             q[i, 0] += restitution * before[i, 0]  # also of those that part: see `moving`

@@ -17,6 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...core.compiled import njit
+from .apart import cross
 
 Array = NDArray[np.float64]
 Index = NDArray[np.int64]
@@ -54,14 +55,6 @@ def impulses(rows: Rows, r: Array, bodies: int) -> tuple[Array, Array]:
 
 
 @njit(cache=True, error_model="numpy")
-def _cross(a, b):
-    """a x b; written out, as numpy's takes seconds to compile."""
-    return (
-        a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]
-    )  # fmt: skip
-
-
-@njit(cache=True, error_model="numpy")
 def frames_of(normals):
     """Normal and two tangents, (n, 3, 3) by rows, right-handed."""
     out, helper = np.empty((len(normals), 3, 3)), np.empty(3)
@@ -73,11 +66,11 @@ def frames_of(normals):
                 least = k
         for k in range(3):
             out[i, 0, k], helper[k] = n[k], 1.0 if k == least else 0.0
-        first[0], first[1], first[2] = _cross(n, helper)
+        first[0], first[1], first[2] = cross(n, helper)
         length = np.sqrt(first[0] * first[0] + first[1] * first[1] + first[2] * first[2])
         for k in range(3):
             first[k] /= length
-        second[0], second[1], second[2] = _cross(n, first)
+        second[0], second[1], second[2] = cross(n, first)
     return out
 
 
@@ -224,11 +217,11 @@ def row_velocities(slave, master, axes, arms, master_arms, v, omega):  # noqa: P
     u = np.empty((len(slave), 3))
     for c in range(len(slave)):
         b = slave[c]
-        x, y, z = _cross(omega[b], arms[c])
+        x, y, z = cross(omega[b], arms[c])
         x, y, z = v[b, 0] + x, v[b, 1] + y, v[b, 2] + z
         if master[c] >= 0:
             b = master[c]
-            e, f, g = _cross(omega[b], master_arms[c])
+            e, f, g = cross(omega[b], master_arms[c])
             x, y, z = x - v[b, 0] - e, y - v[b, 1] - f, z - v[b, 2] - g
         for k in range(3):
             u[c, k] = axes[c, k, 0] * x + axes[c, k, 1] * y + axes[c, k, 2] * z
@@ -247,7 +240,7 @@ def row_impulses(slave, master, axes, arms, master_arms, r, bodies):  # noqa: PL
             b, arm = (slave[c], arms[c]) if side == 0 else (master[c], master_arms[c])
             if b < 0:
                 continue
-            sign, torque = 1.0 if side == 0 else -1.0, _cross(arm, p)
+            sign, torque = 1.0 if side == 0 else -1.0, cross(arm, p)
             for d in range(3):
                 push[b, d] += sign * p[d]
                 turn[b, d] += sign * torque[d]
@@ -274,13 +267,13 @@ def turned_freely(inertia, spin, h):
                 for k in range(3):
                     moment[i] += J[i, k] * mean[k]
                     rest[i] += J[i, k] * (after[k] - before[k])
-            turning = _cross(mean, moment)
+            turning = cross(mean, moment)
             for i in range(3):
                 rest[i] += h * turning[i]
             for k in range(3):
                 for i in range(3):
                     unit[i] = 1.0 if i == k else 0.0
-                one, two = _cross(unit, moment), _cross(mean, J[:, k])
+                one, two = cross(unit, moment), cross(mean, J[:, k])
                 for i in range(3):
                     slope[i, k] = J[i, k] + 0.5 * h * (one[i] + two[i])
             _solve_inplace(slope, rest)
@@ -387,7 +380,7 @@ def levers_of(slave, master, axes, arms, master_arms, masses, inverse):  # noqa:
             light = sign / np.sqrt(masses[b])
             for k in range(3):
                 a, row = axes[i, k], levers[i, p, k]
-                turning = _cross(arm, a)
+                turning = cross(arm, a)
                 for d in range(3):
                     row[d] = light * a[d]
                     for e in range(d, 3):  # C is lower triangular

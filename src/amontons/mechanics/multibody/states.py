@@ -137,7 +137,8 @@ def overlap_at_start(
     slave, master = int(found.slave[worst]), int(found.master[worst])
     other = "a plane" if master < 0 else _named(system, master)
     pairs = len({*zip(found.slave[deep].tolist(), found.master[deep].tolist(), strict=True)})
-    more = f", {pairs} pairs in all" if pairs > 1 else ""
+    least = "at least " if len(system.planes) > 1 else ""  # which plane it is nobody tells
+    more = f", {least}{pairs} pairs in all" if pairs > 1 else ""
     place = ", ".join(f"{x:.4g}" for x in found.points[worst])
     text = (
         f"{_named(system, slave)} and {other} overlap at the start by "
