@@ -3,9 +3,10 @@
 The problem is F(v) = 0, piecewise smooth, with a linearisation at every admissible state; see
 `model.large_deformation`.  It is tried at full load at once; where that fails the load grows in
 steps from a state that is known, each begun by one of `predictors`: where Newton's method fails
-from one the next is tried.  `step_lengths` says how far steps go.  Where two bodies slide, and
-no part of a short load step's Newton steps passes the test, bodies creep on (`creeping`), if a
-state under load is known from which they come: from rest a smaller load says more.
+from one the next is tried.  `step_lengths` says how far steps go.  Where two bodies slide and a
+state under load is known, a Newton step that passes the test in no part ends the attempt, and
+the load step is cut; a short one ends with bodies that creep on (`creeping`).  Where these do
+not come to rest load steps begin anew, with patience for steps that do not pass.
 """
 
 from __future__ import annotations
@@ -139,9 +140,12 @@ class NonlinearNewton:
                 yield from shown.best(self._newton(problem, states, target, linear, shown))
             except (Failed, InvertedCells):
                 pass  # the start was no help
-        share, step, reason = 0.0, 1.0, ""
-        v = problem.known_state
+        share, step, v, reason = 0.0, 1.0, problem.known_state, ""
+        creeping_helps = self.crossing is None and problem.shortest > 0
         while True:
+            loaded = share > 0 or bool(problem.known_state.any())
+            if step < self.smallest_share and creeping_helps and loaded:  # with patience, then
+                creeping_helps, share, step, v = False, 0.0, 1.0, problem.known_state
             if step < self.smallest_share:
                 if self.crossing is not None:
                     v, told = self.crossing.across(problem, share, v, target)
@@ -153,9 +157,9 @@ class NonlinearNewton:
                 raise Breakdown(
                     f"no equilibrium found beyond {share:.4g} of the load: {reason}{hint}"
                 )
-            goal, loaded = min(1.0, share + step), share > 0 or bool(problem.known_state.any())
-            creeps = self.crossing is None and loaded and step <= SHORT
-            shown.brief = self.crossing is None and loaded and step > SHORT
+            goal = min(1.0, share + step)
+            creeps = creeping_helps and loaded and step <= SHORT
+            shown.brief = creeping_helps and loaded and step > SHORT
             for predict in predictors(problem):
                 try:
                     first = predict(problem, share, goal, v, target, linear)
@@ -172,7 +176,7 @@ class NonlinearNewton:
                 except (Failed, InvertedCells) as failure:
                     reason = str(failure)
             else:
-                step = (goal - share) / (4 if goal - share == 1.0 else 2)
+                step = 0.0 if creeps else (goal - share) / (4 if goal - share == 1.0 else 2)
                 continue
             share = goal
             step *= 2 if shown.waiting - before <= EASY else 1
@@ -234,7 +238,7 @@ class _Shown:
 
     size: float = np.inf
     waiting: int = 0
-    brief: bool = False
+    brief: bool = False  # steps that the test refuses end an attempt: another way is next
     note: str = ""  # what happened on the way
 
     def best(
