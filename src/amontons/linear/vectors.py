@@ -56,6 +56,26 @@ def advance(x: Array, r: Array, step: float, p: Array, Ap: Array) -> float:
     return float(np.sqrt(np.add.reduce(sums)))
 
 
+def two_dots(a: Array, b: Array, c: Array) -> tuple[float, float]:
+    """a . c and b . c."""
+    sums = np.empty(2 * blocks_of(c.size))
+    flat = [v.reshape(-1) for v in (a, b, c)]
+    over_blocks(_two_dots, c.size, 3.0 * c.size, *flat, sums)
+    first, second = sums.reshape(-1, 2).sum(axis=0)
+    return float(first), float(second)
+
+
+def add_two(
+    y: Array, x: Array, a: tuple[float, float], ys: list[Array], xs: list[Array], r: Array
+) -> tuple[float, float]:
+    """y += a_0 y_0 + a_1 y_1 and x += a_0 x_0 + a_1 x_1; y . y and y . r."""
+    sums = np.empty(2 * blocks_of(y.size))
+    flat = [v.reshape(-1) for v in (y, x, *ys, *xs, r)]
+    over_blocks(_add_two, y.size, 9.0 * y.size, *flat, *a, sums)
+    first, second = sums.reshape(-1, 2).sum(axis=0)
+    return float(first), float(second)
+
+
 def put_at(place: Index, x: Array, out: Array) -> None:
     """out[place] = x, all flat; no place twice."""
     over_rows(_put_at, len(place), 3.0 * len(place), place, x, out)
@@ -103,6 +123,31 @@ def _advance(begin, end, x, r, p, Ap, step, sums):  # noqa: PLR0913
             r[i] = s
             total += s * s
         sums[first // BLOCK] = total
+
+
+@njit(cache=True, error_model="numpy", fastmath={"contract", "reassoc"}, nogil=True)
+def _two_dots(begin, end, a, b, c, sums):
+    for first in range(begin, end, BLOCK):
+        one = two = 0.0
+        for i in range(first, min(first + BLOCK, end)):
+            one += a[i] * c[i]
+            two += b[i] * c[i]
+        k = 2 * (first // BLOCK)
+        sums[k], sums[k + 1] = one, two
+
+
+@njit(cache=True, error_model="numpy", fastmath={"contract", "reassoc"}, nogil=True)
+def _add_two(begin, end, y, x, y0, y1, x0, x1, r, a0, a1, sums):  # noqa: PLR0913
+    for first in range(begin, end, BLOCK):
+        size = along = 0.0
+        for i in range(first, min(first + BLOCK, end)):
+            x[i] += a0 * x0[i] + a1 * x1[i]
+            s = y[i] + a0 * y0[i] + a1 * y1[i]
+            y[i] = s
+            size += s * s
+            along += s * r[i]
+        k = 2 * (first // BLOCK)
+        sums[k], sums[k + 1] = size, along
 
 
 @njit(cache=True, nogil=True)

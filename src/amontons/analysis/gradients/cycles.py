@@ -35,7 +35,7 @@ from numpy.typing import NDArray
 
 from ...core.errors import SingularOperator
 from ...linear.blocks import spatial
-from ...linear.vectors import add_scaled, advance, dot, norm
+from ...linear.vectors import add_two, advance, norm, two_dots
 from ...problem.law.law import TRESCA
 from ...problem.law.states import ContactStatus
 from ...solvers.contract import Breakdown
@@ -282,25 +282,24 @@ def _orthomin(
     It ends where the residual falls slowly, too.
     """
     z, rest, count = np.zeros_like(r), beta, 0
-    ways = [np.empty_like(r) for _ in range(LAST + 1)]
-    products = [np.empty_like(r) for _ in ways]
-    sizes = np.zeros(len(ways))
+    ways = [np.zeros_like(r) for _ in range(LAST + 1)]
+    products = [np.zeros_like(r) for _ in ways]
+    sizes = [0.0 for _ in ways]
     while rest > goal and count < MOST:
         now = count % len(ways)
         way, product = ways[now], products[now]
         cycle.apply(r, way)
         cycle.times(way, product)
-        for k in range(len(ways)):
-            if k == now or not sizes[k] > 0:
-                continue
-            share = -dot(products[k], product) / sizes[k]
-            add_scaled(share, ways[k], way)
-            add_scaled(share, products[k], product)
-        sizes[now] = dot(product, product)
+        one, two = others = [k for k in range(len(ways)) if k != now]
+        dots = two_dots(products[one], products[two], product)
+        shares = tuple(-a / sizes[k] if sizes[k] > 0 else 0.0
+                       for a, k in zip(dots, others, strict=True))  # fmt: skip
+        last = [products[one], products[two]], [ways[one], ways[two]]
+        sizes[now], along = add_two(product, way, (shares[0], shares[1]), *last, r)
         count += 1
         if not 0 < sizes[now] < np.inf:
             break
-        rest = advance(z, r, dot(product, r) / sizes[now], way, product)
+        rest = advance(z, r, along / sizes[now], way, product)
         if count >= EARLY and not rest <= SLOW**count * beta:
             break
     return z, count, rest
