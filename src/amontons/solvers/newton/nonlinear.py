@@ -146,6 +146,7 @@ class NonlinearNewton:
             loaded = share > 0 or bool(problem.known_state.any())
             if step < self.smallest_share and creeping_helps and loaded:  # with patience, then
                 creeping_helps, share, step, v = False, 0.0, 1.0, problem.known_state
+                shown.note = ""
             if step < self.smallest_share:
                 if self.crossing is not None:
                     v, told = self.crossing.across(problem, share, v, target)
