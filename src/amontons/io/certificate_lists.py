@@ -53,13 +53,13 @@ def all_branches_between(
     """
     if found.doubt:
         raise InvalidInput(f"certificate: these may not be all branches: {found.doubt}")
-    by = exclusions_between(start, end, deadline)
-    arrays = _arrays(by.excluded, by.multipliers, by.left, [piece.r for piece in found.pieces])
+    by = exclusions_between(start, end, found.pieces, deadline)
+    arrays = _arrays(by.excluded, by.multipliers, by.left, by.middles)
     return {**arrays, "q": by.loads[0], "end": by.loads[1]}
 
 
 def _arrays(
-    excluded: Sequence[str], y: Array, left: Sequence[str], solutions: Sequence[Array]
+    excluded: Sequence[str], y: Array, left: Sequence[str], solutions: Sequence[Array] | Array
 ) -> dict[str, Any]:
     r = np.array(solutions)
     return {

@@ -344,6 +344,19 @@ def test_branches_over_the_load_are_proved_and_forged_ones_found(tmp_path):
         am.write_certificate(start, found, path)
 
 
+def test_a_short_line_is_listed_by_its_own_middle(tmp_path):
+    """Of .0014 of the interval: it ends where it is sure, 1e-10 inside, and reactions are steep."""
+    W = [[2.297, 1.6, 0.038, -0.055], [1.6, 2.22, -0.005, 0.01],
+         [0.038, -0.005, 2.25, 1.566], [-0.055, 0.01, 1.566, 2.353]]  # fmt: skip
+    start, end = (
+        am.FrictionProblem.from_delassus(W, q, [1.275, 1.44])
+        for q in ([[-0.243, -1.646], [1.158, 1.096]], [[-0.852, 0.213], [-0.893, 0.883]])
+    )
+    found = am.diagram(end, base=start)
+    am.write_certificate(start, found, tmp_path / "c.h5", end=end)
+    assert "+-" in am.check_certificate(tmp_path / "c.h5")
+
+
 def tiny():
     """Contact 2 of W = 1e-20 takes r_N = 1e20: y = -1e-310 there and y W = 0, as is rounded."""
     W, q = np.diag([1.0, 1.0, 1e-20, 1e-20]), np.array([[-1.0, 0.0], [-1.0, 0.0]])

@@ -5,6 +5,7 @@ The search of `interval_search` on the whole interval at once, kept for a certif
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -14,8 +15,9 @@ from ...core.clock import Deadline
 from ...core.errors import InvalidInput
 from ...problem.friction import FrictionProblem
 from ..scaled import Scaled
-from ..statuses import word
-from .interval_search import Family
+from ..statuses import states_of, word
+from .interval_search import Family, not_negative
+from .load_interval import Piece
 from .pattern_leaves import NODE, Cut
 
 Array = NDArray[np.float64]
@@ -34,12 +36,15 @@ class Exclusions:
     multipliers: Array
     left: tuple[str, ...]
     loads: Array
+    middles: Array
 
 
 def exclusions_between(
-    start: FrictionProblem, end: FrictionProblem, deadline: Deadline
+    start: FrictionProblem, end: FrictionProblem, pieces: Sequence[Piece], deadline: Deadline
 ) -> Exclusions:
     """What the search excludes on the whole interval between two loads.
+
+    pieces: all that have solutions there, by `pieces_between`.
 
     Raises InvalidInput where friction differs too, W is not definite, or there is no load at
     an end: then solutions are multiples of those at the other one; TimeUp.
@@ -60,5 +65,21 @@ def exclusions_between(
     loads = family.at(*family.interval)[0] * family.scaled.to_u.repeat(2)
     rows = np.array([y for _, y in cuts]).reshape(len(cuts), -1, 2)
     return Exclusions(
-        tuple(word(states) for states, _ in cuts), rows, tuple(left), loads.reshape(2, -1, 2)
+        tuple(word(states) for states, _ in cuts), rows, tuple(left), loads.reshape(2, -1, 2),
+        np.array([_middle(family, piece) for piece in pieces]),
     )
+
+
+def _middle(family: Family, piece: Piece) -> Array:
+    """Reactions in the middle of a line, (nc, 2).
+
+    A piece ends where it is sure, and a short one may have its middle farther from that of the
+    line than any solution is from another.
+    """
+    states = states_of(piece.pattern)
+    found = family.linear(states).slacks(*family.interval, 0.0)
+    span = None if found is None else not_negative(*found[:2])
+    if span is None:
+        return piece.r
+    first, last = family.interval
+    return family.solution(states, first + (last - first) * (2 + sum(span)) / 4)

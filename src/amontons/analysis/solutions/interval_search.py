@@ -238,11 +238,11 @@ class _Search:
         def place(x: float) -> float:
             return min(max((a + b) / 2 + x * (b - a) / 2, a), b)
 
-        possible = _not_negative(s0 + bound, s1)
+        possible = not_negative(s0 + bound, s1)
         if possible is None:
             return []
         low, high = (place(x) for x in possible)
-        sure = _not_negative(s0 - bound, s1)
+        sure = not_negative(s0 - bound, s1)
         rest = [(low, high)]
         if sure is not None and sure[0] < sure[1]:
             inner = place(sure[0]), place(sure[1])
@@ -301,7 +301,7 @@ def _halves(a: float, b: float) -> list[Span]:
     return [((a + b) / 2, b), (a, (a + b) / 2)]
 
 
-def _not_negative(s0: Array, s1: Array) -> Span | None:
+def not_negative(s0: Array, s1: Array) -> Span | None:
     """The s from -1 to 1 at which no s_0 + s s_1 is negative, if there are any."""
     low, high = -1.0, 1.0
     for x, slope in zip(s0, s1, strict=True):
