@@ -345,7 +345,7 @@ def test_branches_over_the_load_are_proved_and_forged_ones_found(tmp_path):
 
 
 def test_a_short_line_is_listed_by_its_own_middle(tmp_path):
-    """Of .0014 of the interval: it ends where it is sure, 1e-10 inside, and reactions are steep."""
+    """Of .0014 of the interval: its sure part ends 1e-10 inside, and reactions are steep."""
     W = [[2.297, 1.6, 0.038, -0.055], [1.6, 2.22, -0.005, 0.01],
          [0.038, -0.005, 2.25, 1.566], [-0.055, 0.01, 1.566, 2.353]]  # fmt: skip
     start, end = (
