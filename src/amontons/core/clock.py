@@ -161,6 +161,10 @@ class Deadline:
         """The deadline of a stage that may take this part of what is left."""
         return replace(self, moment=self.time + part * self.left)
 
+    def before(self, operations: float) -> Deadline:
+        """So much earlier that as many operations can follow."""
+        return replace(self, moment=self.moment - operations / RATE)
+
     def within(self, seconds: float) -> Deadline:
         """This deadline, or one in so many seconds where that is earlier."""
         return replace(self, moment=min(self.moment, self.time + seconds))

@@ -147,3 +147,18 @@ def test_many_contacts_begin_with_few():
 def test_nothing_to_react():
     assert contact_multipliers(np.zeros((4, 4)), np.ones(2)).t == np.inf
     assert contact_multipliers(np.ones((4, 4)), np.ones(2)).t == 0.0
+
+
+def test_a_search_that_is_cut_leaves_time_for_its_proof():
+    """A search that took all of its time once gave no bound at all, as if W were singular."""
+    W, mu, _ = random_problem(0, 3, contacts=12)
+    told = []
+    for seconds in np.geomspace(1e-6, 1e-2, 25):
+        try:
+            found = contact_multipliers(W, mu / mu.max(), Deadline.counted(seconds))
+        except TimeUp:
+            assert not told
+            continue
+        assert found.t > 0
+        told.append(found.t)
+    assert len(told) > 10

@@ -20,6 +20,7 @@ from .status_pieces import Pieces
 
 Array = NDArray[np.float64]
 LOWER = 0.5  # part of the time for the multipliers
+NOT_PROVED = "multipliers of every contact were found, but no proof in time or within rounding"
 ROOMS = (1e-12, 1e-10, 1e-9, 1e-8, 1e-7, 1e-6)  # above t, where the determinant is negative
 
 
@@ -36,7 +37,9 @@ def lower_bound(
         found = contact_multipliers(pieces.W, pieces.shape, deadline, wanted=wanted)
     except TimeUp as reason:
         return None, str(reason)
-    return (found.unscaled(pieces.scale), "") if found.t > 0 else (None, "W is singular")
+    if found.t > 0:
+        return found.unscaled(pieces.scale), ""
+    return None, NOT_PROVED if found.expected > 0 else "W is singular"
 
 
 def upper_bound(pieces: Pieces, deadline: Deadline) -> DiscPiece | None:

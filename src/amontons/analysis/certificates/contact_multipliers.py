@@ -52,6 +52,7 @@ MANY, FINE_STEPS = 1000, 40  # rows from which on, and steps where a coarser ans
 ROOMS = (1e-4, 1e-3, 5e-3, 2e-2, 0.1)  # by which less is proved than was found
 SINGLE = 0.25  # of the work of RATE: half the length, and products of matrices
 PROOF = 1.0  # operations of a proof per cube of the rows
+PROOFS = 2.0  # for which the search leaves time
 
 
 def contact_multipliers(
@@ -60,7 +61,7 @@ def contact_multipliers(
     """Multipliers for W (k d, k d) and friction in the proportions shape (k,).
 
     wanted: a t that is enough.  Contacts with W_ii = 0 are left out.  Raises TimeUp where the
-    deadline is nearer than a first evaluation; later it ends the search.
+    deadline is nearer than a first evaluation; later it ends the search, in time for a proof.
     """
     k = len(shape)
     d = len(W) // max(k, 1)
@@ -71,7 +72,8 @@ def contact_multipliers(
         return whole
     rows = np.flatnonzero(np.repeat(able, d))
     form = _Form.of(W[np.ix_(rows, rows)], shape[able])
-    best = form.proved(_searched(form, deadline, wanted), deadline, wanted)
+    found = _searched(form, deadline.before(PROOFS * form.proof), wanted)
+    best = form.proved(found, deadline, wanted)
     for name in ("tau", "sigma", "alpha", "f"):
         getattr(whole, name)[able] = getattr(best, name)
     return replace(whole, t=best.t, expected=best.expected)
@@ -252,6 +254,11 @@ class _Form(Pencil):
         return slope
 
     # ---------------------------------------------------------------------- proving
+    @property
+    def proof(self) -> float:
+        """Operations of a proof."""
+        return PROOF * len(self.W) ** 3
+
     def multipliers(self, x: Array, t: float) -> ContactMultipliers:
         """In the units of W as given."""
         tau, sigma, alpha, f = self.parts(x)
@@ -267,10 +274,9 @@ class _Form(Pencil):
         by = self.multipliers(x, t)
         given = self.W * self.root * self.root[:, None]
         for room in ROOMS if t > 0 else ():
-            work = PROOF * len(self.W) ** 3
-            if not deadline.affords(work):
+            if not deadline.affords(self.proof):
                 break
-            deadline.spend(work)
+            deadline.spend(self.proof)
             if holds(given, self.shape, t * (1 - room), by):
                 return replace(by, t=t * (1 - room))
         return by
