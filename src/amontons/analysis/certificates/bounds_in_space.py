@@ -19,7 +19,7 @@ from .disc_pieces import SLIP, DiscPiece, bases, equations, singular_piece
 from .status_pieces import Pieces
 
 Array = NDArray[np.float64]
-LOWER = 0.5  # part of the time for the multipliers
+LOWER = 0.7  # part of the time for the multipliers: many contacts need it
 NOT_PROVED = "multipliers of every contact were found, but no proof in time or within rounding"
 ROOMS = (1e-12, 1e-10, 1e-9, 1e-8, 1e-7, 1e-6)  # above t, where the determinant is negative
 
