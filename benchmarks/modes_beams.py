@@ -16,6 +16,7 @@ from amontons.analysis.stability.modes import DENSE
 Array = np.ndarray
 DEGREE = 21
 COUNTED = 6  # modes of a beam that are compared
+RESOLVED, POINTS = 16.0, 6  # waves along a beam, in radians, and points of flutter asked for
 
 
 def products(given: list[tuple[int, int]], derivative: int) -> Array:
@@ -179,38 +180,42 @@ def inclined_row(degrees: float, e: float) -> str:
         missed = [x for x in wanted[:count] if x < found.s.imag[steady].max() * 0.999
                   and np.abs(found.s.imag[steady] / x - 1).min() > 1e-6]  # fmt: skip
         worst = np.inf if missed else worst
-    points = at(0.3).flutter(1)
-    first, omega = first_flutter(normal, e)
     a, b = normal
     divergence = (a * a / 3 + b * b / e) / (a * b * (1 / 3 - 1 / e))
     told = at(0.3).divergence
     last = "none, rightly" if divergence < 0 and not len(told) else (
         f"{np.abs(told / divergence - 1).min():.0e}" if len(told) else "missed")  # fmt: skip
-    if not points:
-        return (f"| {degrees} | {e:g} | {len(frictions)} | {worst:.0e} | {first:.6g} | none | "
-                f"| {last} |")  # fmt: skip
-    friction = abs(points[0].mu / first - 1)
-    frequency = abs(points[0].frequency * 2 * np.pi / omega - 1)
-    return (f"| {degrees} | {e:g} | {len(frictions)} | {worst:.0e} | {first:.6g} | "
-            f"{friction:.0e} | {frequency:.0e} | {last} |")  # fmt: skip
+    most = RESOLVED * min(RESOLVED, float(np.sqrt(e)))
+    points = [(p.mu, p.frequency * 2 * np.pi) for p in at(0.3).flutter(POINTS)]
+    reach = points[-1][0] if len(points) == POINTS else np.inf
+    points = [one for one in points if one[1] < most]
+    reach = min(reach * (1 + 1e-9), 1e2)
+    wanted = [one for one in meetings(normal, e, most) if one[0] <= reach]
+    apart = [f"{len(wanted)}, {len(points)} told", ""]
+    if len(points) == len(wanted):
+        near = np.abs(np.array(points) / np.array(wanted) - 1) if wanted else np.zeros((1, 2))
+        apart = [f"{x:.0e}" for x in near.max(axis=0)]
+    at_these = ", ".join(f"{one[0]:.6g}" for one in wanted)
+    return (f"| {degrees} | {e:g} | {len(frictions)} | {worst:.0e} | {at_these} | {apart[0]} | "
+            f"{apart[1]} | {last} |")  # fmt: skip
 
 
-def first_flutter(normal: tuple[float, float], e: float) -> tuple[float, float]:
-    """(friction, omega) of the least positive friction at which (2) is stationary."""
-    x = np.linspace(0.5, 600, 400_000)
+def meetings(normal: tuple[float, float], e: float, most: float) -> list[tuple[float, float]]:
+    """(friction, omega) of all maxima > 0 of (2) below a frequency, by friction."""
+    x = np.linspace(0.5, most, 400_000)
     y = friction_at(x, normal, e)
-    best = (np.inf, 0.0)
-    for k in range(1, len(x) - 1):
-        if y[k] > 0 and (y[k] - y[k - 1]) * (y[k + 1] - y[k]) < 0 and y[k] < best[0]:
-            sign = 1.0 if y[k] > y[k - 1] else -1.0
-            found = minimize_scalar(lambda v, s=sign: -s * friction_at(v, normal, e),
-                                    bounds=(x[k - 1], x[k + 1]), method="bounded",
-                                    options={"xatol": 1e-12})  # fmt: skip
-            best = (friction_at(found.x, normal, e), float(found.x))
-    return best
+    top = (y[1:-1] > 0) & (y[1:-1] >= y[:-2]) & (y[1:-1] > y[2:])
+    top &= np.abs(y[2:] - y[:-2]) < 1e-2 * y[1:-1]  # no poles
+    out = []
+    for k in 1 + np.flatnonzero(top):
+        around = float(x[k - 1]), float(x[k + 1])
+        found = minimize_scalar(lambda v: -friction_at(v, normal, e), bounds=around,
+                                method="bounded", options={"xatol": 1e-12})  # fmt: skip
+        out.append((float(friction_at(found.x, normal, e)), float(found.x)))
+    return sorted(out)
 
 
-# ------------------------------------------------------------------------------ elements
+# ---------------------------------------------------------------------------- elements
 def element_rows() -> list[str]:
     """Few and many elements."""
     return [element_row(n) for n in (20, 60, 100, 190, 300)]
