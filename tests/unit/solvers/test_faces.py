@@ -175,11 +175,11 @@ def test_stacks_are_told_from_w_alone():
 
 
 def test_a_stack_goes_to_the_interior_point_after_a_chunk():
-    """It rests, and is solved in a few steps; many at once have the same bits."""
-    problem = problem_of(*pile())
+    """After 20 sweeps, where all had 60 before; many at once have the same bits."""
+    problem = problem_of(*pile(20))
     assert chunks_alone(problem, 1e-9) == 1
     alone = am.drive(problem, tolerance=1e-9)
     assert alone.converged
-    assert alone.convergence.detail == "interior point"
-    assert alone.convergence.iterations < 20 + 15  # sweeps, and steps: there were 60 and 20
+    early = [step.stage for step in alone.convergence.history if step.iteration < 40]
+    assert "interior point" in early
     assert np.array_equal(am.solve_many([problem], tolerance=1e-9)[0].r, alone.r)
