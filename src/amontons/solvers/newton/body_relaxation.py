@@ -28,12 +28,9 @@ from ...problem.law.law import MU, TIED
 from ..sweeps.on_bodies import GROUND, driven_inplace, felt_inplace
 from .block_lu import Symbolic, analyse_doubled, factorise_inplace, found, solve_inplace
 from .cone_steps import (
-    FIRST_REACTION,
-    FIRST_VELOCITY,
     advance_inplace,
     changes_inplace,
     gap_left,
-    part_of_way,
     residual_inplace,
     right_side_inplace,
     room,
@@ -42,6 +39,7 @@ from .cone_steps import (
 from .interior_point import ENOUGH, SHORT, STALLED
 
 Array = NDArray[np.float64]
+BOUNDARY = 0.99  # part of the way to the boundary of the cones that a step goes
 SOFT = 1e-12  # of bonds, relative: E of a row that has none
 
 
@@ -246,7 +244,7 @@ def relax_on_bodies_inplace(  # noqa: PLR0913
             U, L, pivots, work,
         ):  # fmt: skip
             return count
-        sigma, length, part = 0.0, 0.0, 1.0
+        sigma = length = 0.0
         for phase in range(2):
             right_side_inplace(phase, sigma, mean, mu, able, lam, beta, w, dx, dy, residual, f)
             _solved(levers, sides, E, inverse, factor, f, dr, du)
@@ -254,10 +252,9 @@ def relax_on_bodies_inplace(  # noqa: PLR0913
             length = min(room(x, dx, able), room(y, dy, able))
             if not length > 0.0:
                 return count
-            length = min(1.0, length * part)
+            length = min(1.0, length * (1.0 if phase == 0 else BOUNDARY))
             if phase == 0:
-                gap = gap_left(x, y, dx, dy, able, length, total)
-                sigma, part = gap**3, part_of_way(gap)
+                sigma = gap_left(x, y, dx, dy, able, length, total) ** 3
         short = short + 1 if length < SHORT else 0
         if short > STALLED:
             return count
@@ -277,7 +274,7 @@ def relaxed(  # noqa: PLR0913
     mu = law[1][:, MU]
     size = float(np.linalg.norm(q)) / math.sqrt(max(len(q), 1))
     x, y = np.zeros_like(q), np.zeros_like(q)
-    x[:, 0], y[:, 0] = FIRST_REACTION * size * rho, FIRST_VELOCITY * size
+    x[:, 0], y[:, 0] = size * rho, size
     r = x / np.where(mu > 0, mu, 1.0)[:, None]
     r[law[0] == TIED] = 0.0
     done = relax_on_bodies_inplace(
