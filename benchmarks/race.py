@@ -173,7 +173,8 @@ def record(folder, seed, cap, path):
             if found is not None and entry.needs is not None:
                 row["needs"][entry.name] = entry.needs(state)
             if found is not None and entry.stacked and state.is_stacked:
-                row["stacked"][entry.name] = entry.stacked * state.relaxation_cost
+                each = state.relaxation_cost + rules.CALL
+                row["stacked"][entry.name] = entry.stacked * each
         row["auto"] = {}
         for t in TOLERANCES:
             best = oracle(row, t)[0]

@@ -22,8 +22,9 @@ believed less: its rest counts C / (GRACE F) times.  Besides
                 while it promises the goal for less than to let them in costs
     stacks      where most contacts share faces of rigid bodies, reactions are many more than
                 balances: the method that solves such a problem at rest in a few steps follows
-                the first chunk, or the third where these are brief, unless the first track
-                promises to be there for less, and has what it usually needs before all others
+                the first chunk, unless the first track promises to be there for less, and has
+                what it usually needs before all others; where chunks are brief it waits with
+                the others, and comes before them
     nothing     where no track promises anything, the one that has cost least
 
     the end     where five times as much was spent as when the best error last halved, and a
@@ -287,11 +288,15 @@ class Race:
 
         A tighter goal that is sent counts from there on.
         """
-        tolerance = self.state.target.tolerance
+        tolerance, alone = self.state.target.tolerance, FIRST_CHUNKS
         while self.tracks and self._is_first():
             yield from self._go_on(self.tracks[0])
-            if self.chunks == chunks_alone(self.state.problem, tolerance):
-                yield from self._on_stacks()
+            if self.chunks == 1:
+                alone = chunks_alone(self.state.problem, tolerance)
+                if alone == 1:
+                    yield from self._on_stacks()
+        if alone > 1:
+            yield from self._on_stacks()
         self.enter()
         while self.tracks and not self._is_lost():
             yield from self._go_on(self._next())
@@ -311,7 +316,7 @@ class Race:
             return
         first = self.tracks[0]
         for entry in [e for e in self.table if e.stacked and e.when(state)]:
-            needed = entry.stacked * state.relaxation_cost
+            needed = entry.stacked * (state.relaxation_cost + CALL)
             track = Track(entry, state)
             self.tracks.append(track)
             while track in self.tracks and track.cost < needed:
