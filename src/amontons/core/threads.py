@@ -27,7 +27,7 @@ from .team import MOST, together
 Kernel = Callable[..., None]
 Range = tuple[int, int]
 BLOCK = 8192  # rows of a partial sum
-GRAIN = 50_000  # numbers that a part touches at least: 20 µs and more; to wake a thread takes 40
+GRAIN = 50_000  # numbers that a part touches at least: 20 µs; to wake a thread takes 40
 FINER = 2  # parts for each thread where these cost nothing: who comes late leaves one to others
 DEFAULT_MOST = 16  # threads without being told: then memory is the limit, not the cores
 VARIABLE = "AMONTONS_THREADS"

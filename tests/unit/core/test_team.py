@@ -1,4 +1,4 @@
-"""Helpers that take parts: each part once, nobody waits for a helper to begin, nothing stays."""
+"""Helpers that take parts: each part once, none is waited for to begin, nothing is kept."""
 
 import gc
 import threading
@@ -152,13 +152,14 @@ def test_nothing_of_a_call_is_kept(fresh):
     class Thing:
         """Something large."""
 
-    thing = Thing()
-    known = weakref.ref(thing)
-    both = threading.Barrier(2, timeout=SECONDS)
-    together(lambda part: (thing, both.wait()), [0, 1], 2)
+    def call():
+        thing, both = Thing(), threading.Barrier(2, timeout=SECONDS)
+        together(lambda part: (thing, both.wait()), [0, 1], 2)
+        return weakref.ref(thing)
+
+    known = call()
     while not fresh.idle:  # the helper has rung, and is about to forget
         pass
-    del thing, both
     gc.collect()
     assert known() is None
 
