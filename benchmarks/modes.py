@@ -313,8 +313,8 @@ def main() -> None:
         "## Disc and two pads", "",
         "Radii 40 and 150 mm, 20 mm thick, held at its inner rim; pads from 95 to 132 mm over "
         "60 degrees, 15 mm thick. E 200 GPa, nu .3, 7850 kg/m3, friction .3 (those of td-1; "
-        "its mesh and its geometry are not at hand, so that 6474 Hz can not be compared). Eight "
-        "modes near 6474 Hz; left: of their equations, relative to the largest term.", "",
+        "its mesh and its geometry are not at hand, so that 6474 Hz can not be compared). "
+        "Eight modes near 6474 Hz; left: of their equations, relative to the largest term.", "",
         "| unknowns | speed, rad/s | modes that grow | Hz | damping | left | s |",
         "|---|---|---|---|---|---|---|", *shown(disc_rows()), "",
     ]  # fmt: skip
