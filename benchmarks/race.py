@@ -160,7 +160,7 @@ def record(folder, seed, cap, path):
             solved(problem, 1e-8, 1.0)
         state = State(problem, Target(1e-8), np.zeros((problem.contacts, 3)))
         row = {"kind": kind, "name": name, "contacts": problem.contacts, "traces": {},
-               "needs": {}}  # fmt: skip
+               "needs": {}, "trials": {}}  # fmt: skip
         fastest = math.inf
         for entry in ALONE:
             most = min(cap, max(0.2, 8 * fastest))
@@ -172,6 +172,8 @@ def record(folder, seed, cap, path):
             fastest = min(fastest, crossing(found, 1e-8))
             if found is not None and entry.needs is not None:
                 row["needs"][entry.name] = entry.needs(state)
+            if found is not None and entry.trial is not None:
+                row["trials"][entry.name] = entry.trial(state)
         row["auto"] = {}
         for t in TOLERANCES:
             best = oracle(row, t)[0]
@@ -199,6 +201,7 @@ CONSTANTS = {
     "optimisms": {e.name: e.optimism for e in ALONE},
     "needs": {e.name: 1.0 for e in ALONE if e.needs is not None},
     "near": rules.NEAR, "nears": {e.name: e.near for e in ALONE if e.near},
+    "agains": {e.name: e.again for e in ALONE if e.trial is not None},
 }  # fmt: skip
 LAST = {e.name for e in ALONE if e.last}
 
@@ -265,6 +268,8 @@ def simulated(row, goal, c):
         likely = c["nears"].get(name, 0.0) * mean
         if track.cost < likely:
             promise = min(promise, likely - track.cost)
+        if name in row["trials"]:
+            promise = min(promise, c["agains"][name] * max(track.cost, row["trials"][name]))
         unknown = track.cost < c["shares"][name] * total
         return min(promise, c["optimisms"][name] * total) if unknown else promise
 
@@ -312,7 +317,7 @@ GRID = {
     "grace": (1.0, 1.2, 1.5, 2.0, 4.0),
     "shares": (0.0, 0.02, 0.05, 0.1, 0.15, 0.2, 0.3), "optimisms": (0.1, 0.3, 1.0, 3.0, 10.0),
     "needs": (0.3, 0.5, 0.7, 1.0, 1.5, 2.0), "near": (1.0, 1.2, 1.5, 2.0),
-    "nears": (0.0, 1.0, 1.5, 2.0, 3.0),
+    "nears": (0.0, 1.0, 1.5, 2.0, 3.0), "agains": (2.0, 3.0, 5.0, 8.0, math.inf),
 }  # fmt: skip
 
 
