@@ -1,8 +1,10 @@
 """Auto beside the best of its own methods in hindsight, on classes of cone problems.
 
     python benchmarks/race.py [--seed 7] [--cap 3] [--traces FILE] [--kept] [--tune COUNT]
+    python benchmarks/race.py --unseen [...]
 
-The problems are those of `classes.py`.  Every track of the table in `solvers/auto/portfolio.py`
+The problems are those of `classes.py`; --unseen takes those on which no constant was chosen but
+`Entry.again`, that one at other seeds.  Every track of the table in `solvers/auto/portfolio.py`
 runs alone on each of them for at most `cap` CPU seconds, those of Newton's kind from 60
 accelerated sweeps, as in the race; the *oracle* is the fastest of them.  Auto is a whole solve,
 judge and bookkeeping included, for at most `cap` or PATIENCE times the oracle; like a track it
@@ -11,7 +13,7 @@ is asked for the error in the sum.  CPU seconds, one thread, blocks and diagonal
 --tune COUNT draws so many constants of the race at random and simulates it on the recorded
 traces, where tracks do not exchange reactions: the best for all classes, and for all but one,
 which is then scored with them.
-Writes results/race.md beside this file.
+Writes results/race.md beside this file, or results/race_unseen.md.
 """
 
 import os
@@ -29,7 +31,7 @@ from collections import defaultdict
 from pathlib import Path
 
 import numpy as np
-from classes import classes
+from classes import classes, unseen
 from machine import describe
 
 import amontons as am
@@ -147,10 +149,11 @@ def solved(problem, tolerance, cap):
     return best
 
 
-def record(folder, seed, cap, path):
+def record(problems, cap, path):
     """Traces of all tracks and times of Auto on all problems, kept in a file as they come."""
     out = []
-    for kind, name, problem in classes(folder, seed):
+    for kind, name, given in problems:
+        problem = given.condensed()
         if problem.contacts < 20:
             continue
         _ = problem.kernel_data, problem.q_norm, problem.blocks.eliminated
@@ -431,20 +434,24 @@ def main():
     parser.add_argument("--folder", type=Path, default=SHARED / "data/fclib")
     parser.add_argument("--seed", type=int, default=7)
     parser.add_argument("--cap", type=float, default=3.0)
-    parser.add_argument("--traces", type=Path, default=HERE / "results/race.pickle")
+    parser.add_argument("--unseen", action="store_true")
+    parser.add_argument("--traces", type=Path)
     parser.add_argument("--kept", action="store_true", help="take the traces of the last run")
     parser.add_argument("--tune", type=int, default=0, metavar="COUNT")
     chosen = parser.parse_args()
+    name = "race_unseen" if chosen.unseen else "race"
+    traces = chosen.traces or HERE / f"results/{name}.pickle"
+    problems = unseen(chosen.seed) if chosen.unseen else classes(chosen.folder, chosen.seed)
     if chosen.kept:
-        rows = pickle.loads(chosen.traces.read_bytes())
+        rows = pickle.loads(traces.read_bytes())
     else:
-        rows = record(chosen.folder, chosen.seed, chosen.cap, chosen.traces)
+        rows = record(problems, chosen.cap, traces)
     command = f"python benchmarks/race.py --seed {chosen.seed} --cap {chosen.cap:g}"
+    command += " --unseen" if chosen.unseen else ""
     command += f" --tune {chosen.tune}" if chosen.tune else ""
     machine = "; ".join(f"{k} {v}" for k, v in describe().items())
     text = page(rows, machine, command, crossed(rows, chosen.tune) if chosen.tune else [])
-    (HERE / "results/race.md").write_text(text)
-
+    (HERE / f"results/{name}.md").write_text(text)
 
 
 if __name__ == "__main__":
