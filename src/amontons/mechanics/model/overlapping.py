@@ -9,8 +9,6 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-import numpy as np
-
 from ...core.warned import ResultWarning
 from .fields import ContactFields
 from .matching import pairs_of

@@ -60,13 +60,14 @@ from ...solvers.contract import Iterate, Solver
 from ...solvers.driver import drive_as_asked
 from .bodies import RigidBodies
 from .ends import ended, freely, middle_of
+from .guides import between_planes, least_squeezed
 from .joints import Joints
 from .meeting import Meetings, meetings
 from .quick import Found, Posed, law_of, matched, pose
 from .rolling import couples, rolling_problem
 from .rows import Rows, delassus, impulses, rotations, rows_at, turned, velocities
 from .states import Motion, RigidEnergies, RigidState, RigidStep, overlap_at_start, too_long
-from .sweeping import FEWEST, WORK, Search, found_quickly
+from .sweeping import Search, found_quickly
 
 Array = NDArray[np.float64]
 Index = NDArray[np.int64]
@@ -74,7 +75,6 @@ WHOLE = 1e-9  # the end may miss a whole number of steps by this part of a step
 OVERLAP = 1e-5  # of the smallest body, below which overlaps are left
 MENDED = 1e-6  # error of a mending that is let pass: what it leaves is mended in the next step
 FAR = 1e-3  # of the smallest body, moved by mending, from which contacts are found again
-SOFT, EARLY = 0.05, 1e-6  # how contacts give way, of W_ii, and error, where planes may squeeze
 TOUCHING = 1e-9  # of a body, gaps up to which it touches
 NOTHING = np.zeros((0, 3))
 
@@ -182,7 +182,7 @@ class _Stepping:
         self.bodies = masses, inertia, self.inverse
         self.no_couples = np.zeros((len(masses), 3))
         self.near = TOUCHING * system.packed.reach
-        self.facing = system.mu > 0 and len(system.planes) > 1
+        self.normals: Array = system.packed.planes[:, :3]
         self.joints = Joints(system, masses, self.inverse) if len(system.joints) else None
 
     # ------------------------------------------------------------------ a step
@@ -303,35 +303,16 @@ class _Stepping:
         mu, asked = self.system.mu, self.asked
         timed = deadline is not NEVER and (deadline.work is not None or deadline.passed)
         if self.solver is None and not timed:
-            if self.facing and contacts:
-                posed = self._least_squeezed(rows, R, posed, contacts)
-            search = Search(posed, rows, R, self.bodies, contacts, mu, asked.tolerance)
+            given = R, self.bodies
+            if mu > 0 and between_planes(rows, contacts, self.normals, len(R)):
+                posed = least_squeezed(rows, *given, posed, contacts, mu, asked.tolerance)
+            search = Search(posed, rows, *given, contacts, mu, asked.tolerance)
             found, start = found_quickly(search)
             if found is not None:
                 return found
             posed = posed._replace(start=start)
         law = law_of(contacts, len(posed.q) - contacts, mu)
         return self._driven(posed.problem(law), posed.start, what, deadline)
-
-    def _least_squeezed(self, rows: Rows, R: Array, posed: Posed, contacts: int) -> Posed:
-        """The same, started from what is solved with contacts that press if all give way."""
-        data = posed.data.copy()
-        own = data[posed.diagonal]
-        data[posed.diagonal] = own + SOFT * np.trace(own, axis1=1, axis2=2).mean() * np.eye(3)
-        given = R, self.bodies
-        soft = Search(posed._replace(data=data), rows, *given, contacts, self.system.mu, EARLY)
-        found = soft.sweep(soft.r, max(FEWEST, WORK // max(len(posed.indices), 1)), 0)
-        r = soft.latest if found is None else found.r
-        presses = r[:, 0] > 0.0
-        presses[contacts:] = True
-        some: list[Any] = [part[presses] for part in rows]
-        inverse = R @ self.inverse @ R.swapaxes(1, 2)
-        W = delassus(Rows(*some), self.bodies[0], inverse)
-        few, count = Posed(*W, posed.q[presses], r[presses]), int(presses[:contacts].sum())
-        search = Search(few, Rows(*some), *given, count, self.system.mu, self.asked.tolerance)
-        start = np.zeros_like(r)
-        start[presses] = found_quickly(search)[1]
-        return posed._replace(start=start)
 
     def _rolled(  # noqa: PLR0913
         self, at: _Met, R: Array, posed: Posed, spin: Array, state: RigidState, what: str,
