@@ -1,8 +1,11 @@
 """Dual mortar contact of two deforming bodies where they are now.
 
 A pair has slave nodes p and a master surface.  All is taken at the positions x of all nodes:
-n_p is the unit normal at p, the area average of the facets around it, out of the master into
-the slave.  On every slave facet psi are the dual functions of `dual` on that part of it that
+n_p is the unit normal at p, out of the master into the slave, the area average of the facets
+around it where they face the master: beyond a rim the slave's surface rises, steeper than the
+master ends, and what rises there takes no force.  (By whole facets the horizontal force of a die
+whose rim is pressed in was 2 to 3 % too high, on fine meshes too.)  Of a node that faces nobody,
+in dynamics, under a given bound and of a surface that meets itself facets count whole.  On every slave facet psi are the dual functions of `dual` on that part of it that
 faces the master ([PSG]), D_p = int psi_p over all facets, and
 
     B_pp = 1,   B_pq = - int psi_p N_q / D_p  of master nodes q,   sum_j B_pj = 0,         (1)
@@ -70,6 +73,7 @@ from .shared import Shared
 Array = NDArray[np.float64]
 Index = NDArray[np.int64]
 Mask = NDArray[np.bool_]
+ROUNDING = 1e-12  # of a facet: what does not face the master where all of it does
 ACROSS = 0.5  # m . n_M of (3') below which sides hardly face each other: d is zero
 
 
@@ -153,9 +157,30 @@ class MortarMeeting:
         return None if self.axes is None else (self.axes @ self.x).reshape(-1, 2, 3)
 
     @cached_property
+    def covered(self) -> Array | None:
+        """Parts of the slave's facets that face the master, (f,); None: n is of them all."""
+        pair = self.pair
+        if pair.areas is None or pair.fold is not None:
+            return None
+        parts, out = self.shared, np.zeros(len(pair.slave.nodes))
+        whole = np.linalg.norm(pair.slave.areas(self.x)[parts.facets], axis=1)
+        out[parts.facets] = parts.mass.sum(axis=(1, 2)) / whole
+        return np.where(np.abs(out - 1) < ROUNDING, 1.0, out)
+
+    @cached_property
+    def heeded(self) -> Array:
+        """Parts (f, a) of facets `around` in the normals of their nodes."""
+        skin, heeded = self.pair.around
+        if self.covered is None:
+            return heeded.astype(np.float64)
+        met = np.zeros(len(self.x), dtype=bool)
+        met[self.pair.slaves] = self.met
+        return heeded * np.where(met[skin.nodes], self.covered[:, None], 1.0)
+
+    @cached_property
     def sums(self) -> Array:
         """Area vectors around the slaves, into the slave, in free directions, (nc, d)."""
-        skin, heeded = self.pair.around
+        skin, heeded = self.pair.around[0], self.heeded
         share = -skin.areas(self.x) / skin.corners[:, None]
         out = np.zeros(self.x.shape)
         for slot in range(skin.nodes.shape[1]):
