@@ -2,10 +2,9 @@
 
 A pair has slave nodes p and a master surface.  All is taken at the positions x of all nodes:
 n_p is the unit normal at p, out of the master into the slave, the area average of the facets
-around it where they face the master: beyond a rim the slave's surface rises, steeper than the
-master ends, and what rises there takes no force.  (By whole facets the horizontal force of a die
-whose rim is pressed in was 2 to 3 % too high, on fine meshes too.)  Of a node that faces nobody,
-in dynamics, under a given bound and of a surface that meets itself facets count whole.  On every slave facet psi are the dual functions of `dual` on that part of it that
+around it where they face the master, as what rises beyond a rim would tilt forces; of a node
+that faces nobody, in dynamics and under a given bound the average of whole facets.
+On every slave facet psi are the dual functions of `dual` on that part of it that
 faces the master ([PSG]), D_p = int psi_p over all facets, and
 
     B_pp = 1,   B_pq = - int psi_p N_q / D_p  of master nodes q,   sum_j B_pj = 0,         (1)
@@ -156,26 +155,28 @@ class MortarMeeting:
         """E of `surface_axes`, (nc, 2, 3); None for none."""
         return None if self.axes is None else (self.axes @ self.x).reshape(-1, 2, 3)
 
+    @property
+    def faced(self) -> Index:
+        """Numbers in `around` of the facets of `shared`, (f,)."""
+        of = self.shared.facets
+        return of if self.pair.fold is None else self.pair.fold.halves[0][of]
+
     @cached_property
     def covered(self) -> Array | None:
-        """Parts of the slave's facets that face the master, (f,); None: n is of them all."""
-        pair = self.pair
-        if pair.areas is None or pair.fold is not None:
+        """Parts of facets `around` that face the master, (f,); None: all count whole."""
+        if self.pair.areas is None:
             return None
-        parts, out = self.shared, np.zeros(len(pair.slave.nodes))
-        whole = np.linalg.norm(pair.slave.areas(self.x)[parts.facets], axis=1)
-        out[parts.facets] = parts.mass.sum(axis=(1, 2)) / whole
+        whole = np.linalg.norm(self.pair.around[0].areas(self.x), axis=1)
+        out = np.zeros(len(whole))
+        out[self.faced] = self.shared.mass.sum(axis=(1, 2)) / whole[self.faced]
         return np.where(np.abs(out - 1) < ROUNDING, 1.0, out)
 
     @cached_property
     def heeded(self) -> Array:
         """Parts (f, a) of facets `around` in the normals of their nodes."""
-        skin, heeded = self.pair.around
-        if self.covered is None:
-            return heeded.astype(np.float64)
-        met = np.zeros(len(self.x), dtype=bool)
-        met[self.pair.slaves] = self.met
-        return heeded * np.where(met[skin.nodes], self.covered[:, None], 1.0)
+        (skin, heeded), covered = self.pair.around, self.covered
+        met = np.isin(skin.nodes, [] if covered is None else self.slaves[self.met])
+        return heeded * np.where(met, 1.0 if covered is None else covered[:, None], 1.0)
 
     @cached_property
     def sums(self) -> Array:
@@ -190,7 +191,7 @@ class MortarMeeting:
     @cached_property
     def normals(self) -> Array:
         """n, (nc, d); zero where all facets around have shrunk to points."""
-        size = np.linalg.norm(self.sums, axis=1)[:, None]
+        size = np.linalg.norm(self.sums, axis=1, keepdims=True)
         return self.sums / np.where(size > 0, size, 1.0)
 
     # ---------------------------------------------------------------- averages

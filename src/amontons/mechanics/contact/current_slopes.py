@@ -156,9 +156,9 @@ class MortarSlopes:
         along = np.einsum("fd,fdw->fw", facing, slopes[some, 0])
         across = (values[some] @ facing[:, None, :, None]) * partly[some][..., None, None]
         out[0].values[some] -= across * along[:, None, None, :]
-        parts = self.at.shared
-        pairs = np.flatnonzero(partly.any(axis=1)[parts.facets][parts.of])
-        of = parts.facets[parts.of[pairs]]
+        of = self.at.faced[self.at.shared.of]
+        pairs = np.flatnonzero(partly.any(axis=1)[of])
+        of = of[pairs]
         by_area, _, dofs = self.integrals
         number = np.full(f, -1)
         number[some] = np.arange(len(some))
