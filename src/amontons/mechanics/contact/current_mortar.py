@@ -144,7 +144,6 @@ class MortarMeeting:
         """Nodes with a row, (nc,)."""
         return self.pair.slaves
 
-    # ---------------------------------------------------------------- normals
     @property
     def axes(self) -> sparse.csr_array | None:
         """Those of the pair."""
@@ -176,7 +175,8 @@ class MortarMeeting:
         """Parts (f, a) of facets `around` in the normals of their nodes."""
         (skin, heeded), covered = self.pair.around, self.covered
         met = np.isin(skin.nodes, [] if covered is None else self.slaves[self.met])
-        return heeded * np.where(met, 1.0 if covered is None else covered[:, None], 1.0)
+        parts = np.where(met, 1.0 if covered is None else covered[:, None], 1.0)
+        return np.where(heeded, parts, 0.0)
 
     @cached_property
     def sums(self) -> Array:

@@ -146,8 +146,9 @@ class MortarSlopes:
         values = np.where((row >= 0)[:, :, None, None], project[row] * share, 0.0)
         slopes = skin.area_slopes(x).reshape(f, 1, d, a * d)
         out = [SlotSlopes(values @ slopes, row, dofs_of(skin.nodes, d))]
-        partly = (heeded > 0) & (heeded < 1)
-        some = np.flatnonzero(partly.any(axis=1))
+        partly = np.asarray((heeded > 0) & (heeded < 1))
+        cut = np.asarray(partly.any(axis=1))
+        some = np.flatnonzero(cut)
         if not len(some) or self.at.covered is None:
             return out
         # parts that are met change with the master: c a = C a / |a|, C the area that is met
@@ -157,7 +158,7 @@ class MortarSlopes:
         across = (values[some] @ facing[:, None, :, None]) * partly[some][..., None, None]
         out[0].values[some] -= across * along[:, None, None, :]
         of = self.at.faced[self.at.shared.of]
-        pairs = np.flatnonzero(partly.any(axis=1)[of])
+        pairs = np.flatnonzero(cut[of])
         of = of[pairs]
         by_area, _, dofs = self.integrals
         number = np.full(f, -1)
