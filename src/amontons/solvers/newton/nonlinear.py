@@ -161,7 +161,8 @@ class NonlinearNewton:
                     f"no equilibrium found beyond {share:.4g} of the load: {reason}{hint}"
                 )
             goal = min(1.0, share + step)
-            arrived, note, ways = False, shown.note, predictors(problem)
+            arrived, before, note = False, 0, shown.note
+            ways = predictors(problem)
             shown.brief = creeping_helps and loaded
             for predict in ways:
                 creeps = shown.brief and predict is ways[-1]
