@@ -10,7 +10,7 @@ One cycle, from v on the finest level:
    contacts solve again, and states, reactions and residual are of this v.
 3. coarse correction: one linear V(1,1) cycle, with two on the second coarse level, on levels
    that see these states, a Galerkin tangent whose test and trial spaces are truncated to the
-   directions in which the contacts can move (`truncation`).  It is renewed when more than few
+   directions in which the contacts can move (`truncation`).  It is renewed when more than FEW
    states change or the error has fallen far.  Slip ends where it would turn round
    (`ContactNodes.limit`).
 4. smooth in reverse order.
@@ -18,12 +18,6 @@ One cycle, from v on the finest level:
 Residuals say little of what moves slowly in soft parts between stiff ones: after LATE cycles
 whole steps are mixed instead (`anderson`), between 4 and 1 and with a longer memory.  What is
 mixed is forgotten when many states change.
-
-Where hardly a state changes any more and the error falls, but slowly, the bulk is what is slow
-and cycles are calm: the contacts and what they touch are relaxed once, between the backward and
-the next forward sweep in the bulk, mixed points keep the law without another solve, and the
-coarse correction is one V-cycle, as in the linear cycle on the tangent.  Where cycles are quick
-that would take two more of them; where M is not stored, as smoothing is weaker, three.
 
 While many states change and the error hardly falls, step 3 is that of the convex problem with
 the present bounds of friction: nodes that it lets penetrate are lifted to the surface, and the
@@ -71,14 +65,14 @@ from ..least_residual import LeastResidual
 from .levels import ContactLevels
 from .nodes import ContactNodes
 from .tangent import Tangent
+from .visits import CLOSED
 
 Array = NDArray[np.float64]
 MANY = 0.1  # share of contacts that change their state above which mixing begins anew
 GROWTH = 1e3  # of the error over the best one that counts as divergence
 LATE = 30  # cycles after which steps are mixed: residuals hide slow errors in soft parts
-FEW = 0.01  # share of contacts in another state up to which the tangent stays, and a cycle calm
-QUICK = 0.3  # fall of the error in a cycle below which relaxing the contacts more pays
 LONG = 24  # steps to mix then
+FEW = 0.01  # share of the closed contacts up to which changed states leave the tangent as it is
 GRID_DEPTH = 2  # past cycles to mix at most where M is not stored
 SLOW = 0.8  # fall of the error in a cycle above which, while states change, steps are limited
 CLOSE = 0.99  # share of the error that should do at which an iterate is handed out
@@ -199,9 +193,7 @@ class _Run:
         tangent.begin(k, self.contacts)
         self.parts = self.contacts.tangent()  # V, W, L at the present states
         self.states = np.full_like(self.contacts.state, -2)  # of the tangent
-        self.kept = self.states  # of the last point that is mixed
         self.frozen = False  # are the bounds of friction, in the tangent?
-        self.calm = False  # hardly any contact changes its state
         self.updates = 0
         self.goal = 0.0  # error that will do
         self.r = np.empty_like(self.f)
@@ -221,20 +213,16 @@ class _Run:
                 before = np.empty_like(x)
             if long is not None:
                 copy_into(x, before)
-            self.calm = self.calm and self.relax_calmly(x)
             self.smooth(x, backward=False)
-            for _ in range(0 if self.calm else self.options.contact_sweeps):
+            for _ in range(self.options.contact_sweeps):
                 self.contacts.relax(self.f, x, self.held, backward=False)
             self.level.A.residual(x, self.f, self.r)
-            if self.calm:
-                error = self.accelerate_calmly(x, mixing)
-            else:
-                error = self.error(x)
-                self.parts = self.contacts.tangent()
+            error = self.error(x)
+            self.parts = self.contacts.tangent()
             unsettled = self.changed() > MANY * len(self.contacts.node)
             if unsettled:
                 mixing.forget()
-            if error > self.goal and long is None and not self.calm:
+            if error > self.goal and long is None:
                 error = self.accelerate(x, error, mixing)
             yield error
             if not np.isfinite(error) or error > GROWTH * best:
@@ -243,16 +231,13 @@ class _Run:
             if patience.over(error):
                 raise Breakdown("contact multigrid: the cycles have stalled")
             careful = unsettled and error > SLOW * last
-            fair = QUICK * last < error < SLOW * last and self.level.A.is_stored
-            self.calm = long is None and fair and self.few_changed()
             last = error
             fallen = error < self.options.update_ratio * at_update
             if not self.few_changed() or careful or self.frozen or fallen:
                 self.renew(careful)
                 at_update = error
             (self.correct_carefully if careful else self.correct)(x)
-            if not self.calm:
-                self.contacts.relax(self.f, x, self.held, backward=True)
+            self.contacts.relax(self.f, x, self.held, backward=True)
             self.smooth(x, backward=True)
             if long is not None:
                 if unsettled:
@@ -262,6 +247,11 @@ class _Run:
     def changed(self) -> int:
         """Number of contacts in another state than in the tangent."""
         return int(np.count_nonzero(self.contacts.state != self.states))
+
+    def few_changed(self) -> bool:
+        """True where hardly any contact has changed its state since the tangent was renewed."""
+        closed = np.count_nonzero(self.contacts.state >= CLOSED)
+        return self.changed() <= FEW * closed
 
     def smooth(self, x: Array, backward: bool) -> None:
         """One sweep in the bulk."""
@@ -291,34 +281,7 @@ class _Run:
             raw = r[node]
             contacts.combine(self.parts[1], r)
         mixing.keep(x.reshape(-1), r.reshape(-1))
-        r[node], self.kept = raw, contacts.state.copy()
-        return error
-
-    def relax_calmly(self, x: Array) -> bool:
-        """Relax the contacts between two sweeps in the bulk; False where many change then."""
-        self.contacts.relax(self.f, x, self.held, backward=False)
-        return self.few_changed()
-
-    def few_changed(self) -> bool:
-        """True where hardly any contact is in another state than in the tangent."""
-        return self.changed() <= FEW * len(self.contacts.node)
-
-    def accelerate_calmly(self, x: Array, mixing: LeastResidual) -> float:
-        """The same for a calm cycle: where no state has changed, mixed points keep the law."""
-        contacts, node, r = self.contacts, self.contacts.node, self.r
-        contacts.combine(contacts.tangent()[1], r)  # W with the slip of now, as in `correct`
-        mixing.mix(x.reshape(-1), r.reshape(-1))
-        if (contacts.state != self.kept).any():
-            contacts.sweep(self.f, x)
-            contacts.residual(self.f, x, r)
-        else:
-            contacts.own_residual(self.f, x, r)
-        error = self.error(x)
-        self.parts = contacts.tangent()
-        raw = r[node]
-        contacts.combine(self.parts[1], r)
-        mixing.keep(x.reshape(-1), r.reshape(-1))
-        r[node], self.kept = raw, contacts.state.copy()
+        r[node] = raw
         return error
 
     def error(self, x: Array) -> float:
@@ -351,7 +314,7 @@ class _Run:
             levels = self.tangent.hierarchy
             coarse = levels.levels[self.k + 1].work
             P.restrict(self.r, coarse.b)
-            levels.cycle(self.k + 1, coarse.b, coarse.x, twice=not self.calm)
+            levels.cycle(self.k + 1, coarse.b, coarse.x, twice=True)
             P.add(coarse.x, x)
         contacts.limit(V, before, x)
 
