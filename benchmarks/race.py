@@ -160,7 +160,7 @@ def record(folder, seed, cap, path):
             solved(problem, 1e-8, 1.0)
         state = State(problem, Target(1e-8), np.zeros((problem.contacts, 3)))
         row = {"kind": kind, "name": name, "contacts": problem.contacts, "traces": {},
-               "needs": {}}  # fmt: skip
+               "needs": {}, "stacked": {}}  # fmt: skip
         fastest = math.inf
         for entry in ALONE:
             most = min(cap, max(0.2, 8 * fastest))
@@ -172,6 +172,9 @@ def record(folder, seed, cap, path):
             fastest = min(fastest, crossing(found, 1e-8))
             if found is not None and entry.needs is not None:
                 row["needs"][entry.name] = entry.needs(state)
+            if found is not None and entry.stacked and state.is_stacked:
+                each = state.relaxation_cost + rules.CALL
+                row["stacked"][entry.name] = entry.stacked * each
         row["auto"] = {}
         for t in TOLERANCES:
             best = oracle(row, t)[0]
@@ -239,6 +242,14 @@ class Replay:
         rest = math.log(max(path / goal, 1.0))
         return rest * (self.cost - cost) / math.log(error / path)
 
+    def soon(self, goal):
+        """Cost to the goal at the rate of the last chunk, see `rules.Track.soon`."""
+        start = [0.0, 0.0, self.first]
+        (_, before, higher), (_, cost, error) = [start, *self.rows[: self.at, :3]][-2:]
+        fall = higher / error if self.at > 1 else min(higher / error, rules.TENTH)
+        rest = math.log(max(error / goal, 1.0)) * (cost - before)
+        return rest / math.log(fall) if fall > 1.0 else math.inf
+
     def promise(self, goal, c):
         """Cost to the goal at its rate, more where it has broken promises."""
         rest = self.rate(goal, c["window"], c["first"])
@@ -272,8 +283,15 @@ def simulated(row, goal, c):
         left = [n for n, t in tracks.items() if t.at < len(t.rows)]
         if not left:
             return math.inf
-        if lead in left and tracks[lead].at < c["first"]:
+        first = min(c["first"], 1) if row["stacked"] else c["first"]
+        quick = row["stacked"].items()
+        second = [n for n, most in quick if n in left and tracks[n].cost < most]
+        if lead in left and tracks[lead].at < first:
             name = lead
+        elif second:
+            needed = row["stacked"][second[0]] - tracks[second[0]].cost
+            sooner = lead in left and tracks[lead].soon(goal) < needed
+            name = lead if sooner else second[0]
         else:
             mean = rules.whole_way(fall, goal, c["near"])
             rests = {n: rest(n, mean) for n in left}

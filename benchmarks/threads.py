@@ -7,9 +7,9 @@ Cubes: `drive(problem, ContactMultigrid())` to 1e-8, what depends on the matrice
 before.  Packing: 300 accelerated sweeps in the order of approach (`anderson_depth=8`).
 Wall seconds are the least of the repeats, with the load of the machine before each (its
 processes that want a core: above the number of threads there is not a core for each).
-Of a busy machine look at the CPU seconds of the calling thread: it works on one part of every
-loop that is shared and on all that is not, so with a core for each thread the wall time is
-not below that.  All runs of one problem have the same bits, or this ends with an error.
+The calling thread takes parts of shared loops that no other has begun with: on a busy machine
+its CPU seconds tell how often others came too late.  Regions: loops that were shared.  All runs
+of one problem have the same bits, or this ends with an error.
 
 Writes results/threads.md beside this file.
 """
@@ -28,10 +28,13 @@ from machine import describe
 from multigrid import cube
 
 import amontons as am
+from amontons.core import threads as shared_loops
+from amontons.core.team import together
 from amontons.solvers.driver import drive
 from amontons.solvers.sweeps.kernels import SweepOrder
 
 HERE = Path(__file__).parent
+REGIONS = [0]
 
 
 def cube_solve(level):
@@ -47,17 +50,28 @@ def packing_sweeps(spheres):
     return lambda: drive(problem, solver, max_iterations=300), problem.contacts
 
 
+def _now():
+    """Wall and CPU seconds, those of this thread, and regions so far."""
+    return time.perf_counter(), time.process_time(), time.thread_time(), REGIONS[0]
+
+
+def counted(work, parts, threads):
+    """`together`, counted."""
+    REGIONS[0] += 1
+    together(work, parts, threads)
+
+
 def measure(run, counts, repeats):
-    """Per number of threads the least (wall, CPU of all threads, of the caller, load)."""
+    """Per number of threads the least wall, CPU of all and of the caller, regions, load."""
     out, bits = {n: [] for n in counts}, set()
     run()
     for _ in range(repeats):
         for n in counts:
             am.threads(n)
             load = os.getloadavg()[0] if hasattr(os, "getloadavg") else float("nan")
-            before = time.perf_counter(), time.process_time(), time.thread_time()
+            before = _now()
             found = run()
-            after = time.perf_counter(), time.process_time(), time.thread_time()
+            after = _now()
             out[n].append((*(b - a for a, b in zip(before, after, strict=True)), load))
             bits.add(found.r.tobytes())
     if len(bits) > 1:
@@ -68,10 +82,10 @@ def measure(run, counts, repeats):
 def lines_of(name, found):
     """Rows of the table."""
     first = next(iter(found.values()))
-    for n, (wall, cpu, own, load) in found.items():
+    for n, (wall, cpu, own, regions, load) in found.items():
         yield (
             f"| {name} | {n} | {wall:.3g} | {first[0] / wall:.2f} | {cpu:.3g} | {own:.3g} | "
-            f"{first[2] / own:.2f} | {load:.1f} |"
+            f"{first[2] / own:.2f} | {regions} | {load:.1f} |"
         )
 
 
@@ -82,6 +96,7 @@ def main():
     parser.add_argument("--threads", default="1,2")
     parser.add_argument("--repeats", type=int, default=5)
     given = parser.parse_args()
+    shared_loops.together = counted
     counts = [int(x) for x in given.threads.split(",")]
     rows = []
     for level in [int(x) for x in given.levels.split(",") if x]:
@@ -99,8 +114,9 @@ def main():
         "Regenerate: `python benchmarks/"
         f"{' '.join([Path(sys.argv[0]).name, *sys.argv[1:]])}`.  "
         f"{machine}.", "", text, "",
-        "| problem | threads | wall s | as fast | CPU s | of the caller | less by | load |",
-        "|---|---|---|---|---|---|---|---|", *rows,
+        "| problem | threads | wall s | as fast | CPU s | of the caller | less by | regions | "
+        "load |",
+        "|---|---|---|---|---|---|---|---|---|", *rows,
     ]  # fmt: skip
     (HERE / "results/threads.md").write_text("\n".join(page) + "\n")
     print(*page, sep="\n")

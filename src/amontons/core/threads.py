@@ -1,13 +1,13 @@
-"""Kernels on all cores: parts of their rows in the threads of one pool, the same bits always.
+"""Kernels on all cores: parts of their rows in the threads of one team, the same bits always.
 
 A kernel that is to be shared takes (first, last, ...), writes nothing outside of its rows that
 another part reads or writes, and computes a row alike whatever `first` and `last` are; it is
 compiled with nogil=True.  Then neither the number of threads nor who was quicker can be seen in
 the result.  Sums over all rows are those of blocks of fixed length (`BLOCK`), added in order.
 
-The caller works on the first part itself and waits for the others.  A part never asks for
-threads, so that any number of solves at the same time, each in a thread of its user, can not
-wait for each other.  What takes less than some tenths of a millisecond is not shared at all.
+The caller works as well, and takes what no thread has begun with (`team`), so that any number
+of solves at the same time, each in a thread of its user, can not wait for each other.  What
+takes less than some ten microseconds a part is not shared at all.
 
 Numba's own threads are not used: of its layers the one that comes with every wheel ends the
 process when two threads use it at the same time.
@@ -19,49 +19,25 @@ import os
 from collections.abc import Callable, Iterable, Sequence
 from functools import cache
 from pathlib import Path
-from threading import Lock
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from .errors import InvalidInput
-
-if TYPE_CHECKING:
-    from concurrent.futures import Future, ThreadPoolExecutor
+from .team import MOST, together
 
 Kernel = Callable[..., None]
 Range = tuple[int, int]
 BLOCK = 8192  # rows of a partial sum
-GRAIN = 150_000  # numbers that a part touches at least: to wake a thread takes some 40 µs
-MOST = 256  # threads of the pool
+GRAIN = 50_000  # numbers that a part touches at least: 20 µs; to wake a thread takes 40
+FINER = 2  # parts for each thread where these cost nothing: who comes late leaves one to others
 DEFAULT_MOST = 16  # threads without being told: then memory is the limit, not the cores
 VARIABLE = "AMONTONS_THREADS"
 _started: set[Kernel] = set()  # kernels that have run in this process: these are compiled
 
 
-class _Pool:
-    """The pool of this process, made when it is needed first, and what was asked for."""
+class _Given:
+    """What was asked for."""
 
     asked: int | None = None
-    executor: ThreadPoolExecutor | None = None
-    lock = Lock()
-
-    @classmethod
-    def get(cls) -> ThreadPoolExecutor:
-        """It starts threads when parts wait for one, and keeps them."""
-        from concurrent.futures import ThreadPoolExecutor
-
-        with cls.lock:
-            if cls.executor is None:
-                cls.executor = ThreadPoolExecutor(MOST, thread_name_prefix="amontons")
-            return cls.executor
-
-    @classmethod
-    def after_fork(cls) -> None:
-        """Threads have not survived; a forked process starts its own."""
-        cls.executor, cls.lock = None, Lock()
-
-
-if hasattr(os, "register_at_fork"):  # not on Windows, which can not fork
-    os.register_at_fork(after_in_child=_Pool.after_fork)
 
 
 def threads(count: int | None = None) -> int:
@@ -75,13 +51,13 @@ def threads(count: int | None = None) -> int:
         if isinstance(count, bool) or not isinstance(count, int) or not 1 <= count <= MOST:
             text = f"expected a whole number from 1 to {MOST}, got {count!r}"
             raise InvalidInput(text, ("threads",))
-        _Pool.asked = count
-    return _Pool.asked or _default()
+        _Given.asked = count
+    return _Given.asked or _default()
 
 
 def asked() -> int:
     """The number of threads that the user has set by `threads` or AMONTONS_THREADS, else 0."""
-    return _Pool.asked or _from_environment(VARIABLE) or 0
+    return _Given.asked or _from_environment(VARIABLE) or 0
 
 
 @cache
@@ -132,15 +108,16 @@ def _quota() -> int:
         return MOST
 
 
-def split(rows: int, work: float, least: int = 1) -> list[Range]:
+def split(rows: int, work: float, least: int = 1, finer: int = 1) -> list[Range]:
     """Ranges of rows for as many threads as `work`, numbers that are touched, is worth.
 
-    least: rows of a range, where there are more ranges than one.
+    least: rows of a range, where there are more ranges than one; finer: ranges for each thread.
     """
     count = int(min(work // GRAIN, rows // least))
-    count = min(threads(), count) if count > 1 else 1
-    if count <= 1:
+    allowed = threads() if count > 1 else 1
+    if allowed == 1:
         return [(0, rows)]
+    count = min(finer * allowed, count)
     ends = [rows * k // count for k in range(count + 1)]
     return list(zip(ends[:-1], ends[1:], strict=True))
 
@@ -150,15 +127,13 @@ def over_rows(kernel: Kernel, rows: int, work: float, *arguments: Any) -> None:
     if work < 2 * GRAIN:  # of small problems the Python around kernels is what takes time
         kernel(0, rows, *arguments)
     else:
-        shared(kernel, split(rows, work), arguments)
+        shared(kernel, split(rows, work, finer=FINER), arguments)
 
 
 def over_blocks(kernel: Kernel, rows: int, work: float, *arguments: Any) -> None:
     """The same with parts that begin at multiples of BLOCK, for partial sums."""
-    blocks = -(-rows // BLOCK)
-    ranges = [
-        (first * BLOCK, min(last * BLOCK, rows)) for first, last in split(blocks, work)
-    ]
+    parts = split(-(-rows // BLOCK), work, finer=FINER)
+    ranges = [(first * BLOCK, min(last * BLOCK, rows)) for first, last in parts]
     shared(kernel, ranges, arguments)
 
 
@@ -166,7 +141,7 @@ def over_chunks(
     kernel: Kernel, chunks: Sequence[Range], work: float, *arguments: Any
 ) -> None:
     """kernel(first, last, *arguments) for every one of some ranges of rows, in any order."""
-    parts = [] if work < 2 * GRAIN else split(len(chunks), work)
+    parts = [] if work < 2 * GRAIN else split(len(chunks), work, finer=FINER)
     if len(parts) > 1:
         _in_threads(kernel, [chunks[first:last] for first, last in parts], arguments)
     else:
@@ -192,7 +167,7 @@ def over_stages(
 
 
 def shared(kernel: Kernel, ranges: Sequence[Range], arguments: tuple[Any, ...]) -> None:
-    """kernel(first, last, *arguments) for some ranges, each in a thread of its own."""
+    """kernel(first, last, *arguments) for some ranges, at once."""
     if len(ranges) == 1:
         kernel(*ranges[0], *arguments)
     else:
@@ -202,7 +177,7 @@ def shared(kernel: Kernel, ranges: Sequence[Range], arguments: tuple[Any, ...]) 
 def _in_threads(
     kernel: Kernel, groups: Sequence[Sequence[Range]], arguments: tuple[Any, ...]
 ) -> None:
-    """One thread a group.  Errors of any part are raised when all have ended."""
+    """A part for each group.  Errors of any part are raised when all have ended."""
     groups = list(groups)
     if kernel not in _started:  # compiled by this thread, whose clock knows of it
         _each(kernel, groups.pop(0), arguments)
@@ -210,32 +185,9 @@ def _in_threads(
         if len(groups) == 1:
             _each(kernel, groups[0], arguments)
             return
-    pool = _Pool.get()
-    futures = [pool.submit(_each, kernel, group, arguments) for group in groups[1:]]
-    try:
-        _each(kernel, groups[0], arguments)
-    finally:
-        errors = _ended(futures)
-    for error in errors:
-        raise error
+    together(lambda group: _each(kernel, group, arguments), groups, threads())
 
 
 def _each(kernel: Kernel, group: Iterable[Range], arguments: tuple[Any, ...]) -> None:
     for first, last in group:
         kernel(first, last, *arguments)
-
-
-def _ended(futures: Sequence[Future[None]]) -> list[BaseException]:
-    """Errors of parts, after all have ended: Ctrl-C waits for them, they work on our arrays."""
-    interrupted: KeyboardInterrupt | None = None
-    errors = []
-    for future in futures:
-        while True:
-            try:
-                error = future.exception()
-                break
-            except KeyboardInterrupt as pressed:
-                interrupted = pressed
-        if error is not None:
-            errors.append(error)
-    return [interrupted, *errors] if interrupted else errors

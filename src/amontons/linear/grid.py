@@ -78,8 +78,9 @@ class GridBlocks:
         self._product(x, b, out, True)
 
     def _product(self, x: Array, b: Array, out: Array, rest: bool) -> None:
-        over_rows(product_of_lines, self._lines, 30.0 * self.nodes, self.shape, *self._terms,
-                  self.stencils, self.used, x, b, out, rest)  # fmt: skip
+        ranges = split(self._lines, 30.0 * self.nodes)  # few: each reads lines of others
+        arguments = self.shape, *self._terms, self.stencils, self.used, x, b, out, rest
+        shared(product_of_lines, ranges, arguments)
 
     def _scale(self, b: Array, out: Array) -> None:
         """out = D^-1 b at the unknowns."""

@@ -28,8 +28,8 @@ from .auto.first_stage import (
     SWEEPS,
     WORST,
     Together,
-    is_brief,
 )
+from .auto.state import is_brief
 from .first_iterate import first_iterate
 from .judging import BLUR
 

@@ -6,7 +6,6 @@ import subprocess
 import sys
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import replace
-from threading import Event
 
 import numpy as np
 import pytest
@@ -34,9 +33,9 @@ def small_parts(monkeypatch):
     monkeypatch.setattr(threads_, "GRAIN", 500)
     monkeypatch.setattr(chunks, "LEAST_ENTRIES", 2000)
     monkeypatch.setattr(chunks, "LEAST_ROWS", 8)
-    before = threads_._Pool.asked
+    before = threads_._Given.asked
     yield
-    threads_._Pool.asked = before
+    threads_._Given.asked = before
 
 
 def same(make):
@@ -63,7 +62,7 @@ def stiffness(shape=(12, 9, 21), seed=1):
 
 
 def test_number_of_threads(monkeypatch):
-    monkeypatch.setattr(threads_._Pool, "asked", None)
+    monkeypatch.setattr(threads_._Given, "asked", None)
     for variables, expected in (
         ({"AMONTONS_THREADS": "3", "OMP_NUM_THREADS": "2"}, 3),
         ({"OMP_NUM_THREADS": "2,1"}, 2),
@@ -121,26 +120,8 @@ def test_an_error_of_a_part_arrives_when_all_have_ended():
         ended.clear()
         with pytest.raises(ValueError, match="part"):
             threads_.over_rows(fail, 9, 1e9)
-        assert sorted(ended) == [0, 3, 6]
+        assert sorted(ended) == [0, 1, 3, 4, 6, 7]
     threads_.over_rows(lambda first, last: None, 9, 1e9)
-
-
-def test_interrupt_waits_for_the_other_parts():
-    am.threads(2)
-    started, done = Event(), []
-
-    def work(first, last):
-        if first > 0:
-            started.set()
-            done.append(first)
-        elif done or threads_._started:
-            started.wait(10)
-            raise KeyboardInterrupt
-
-    threads_._started.add(work)
-    with pytest.raises(KeyboardInterrupt):
-        threads_.over_rows(work, 2, 1e9)
-    assert done == [1]
 
 
 def test_products_and_sweeps():
@@ -357,17 +338,17 @@ FORK = """
 import os, sys
 import numpy as np
 import amontons as am
-from amontons.core import threads
+from amontons.core import team, threads
 from amontons.linear.vectors import dot
 threads.GRAIN = 100
 am.threads(3)
 a = np.cos(np.arange(50_000.0))
 dot(a, a), dot(a, a)
-assert threads._Pool.executor is not None
+assert team._team.count > 0
 pid = os.fork()
 if pid == 0:
     found = dot(a, a)
-    os._exit(0 if found == dot(a, a) and threads._Pool.executor is not None else 1)
+    os._exit(0 if found == dot(a, a) and team._team.count > 0 else 1)
 for _ in range(3):
     dot(a, a)
 sys.exit(os.waitstatus_to_exitcode(os.waitpid(pid, 0)[1]))

@@ -5,6 +5,9 @@ import pytest
 from scipy import sparse
 
 import amontons as am
+from amontons.mechanics.ready.gallery import random_delassus
+from amontons.solvers.auto.race import chunks_alone
+from amontons.solvers.auto.state import is_stacked
 from amontons.solvers.newton.cone_steps import scaled_blocks_inplace
 from amontons.solvers.newton.face_steps import (
     face_memory,
@@ -52,7 +55,7 @@ def solved(found, E, inverse, f, blocks):
     assert factorise_faces_inplace(faces, E, inverse, symbolic, U, L, memory)
     dr, du = np.empty_like(f), np.empty_like(f)
     W = blocks.indptr, blocks.indices, blocks.data
-    step_by_faces_inplace(W, faces, E, inverse, symbolic, U, L, memory, f, dr, du)
+    step_by_faces_inplace(W, faces, E, inverse, symbolic, U, L, memory, f, 2, dr, du)
     return dr
 
 
@@ -154,3 +157,29 @@ def test_no_face_where_w_says_otherwise(size):
     W[30:33, 0:3] += size
     problem = problem_of(W, q)
     assert FaceMatrix.of(problem).faces is NONE
+
+
+def test_stacks_are_told_from_w_alone():
+    """In any order and unit; not where W is full of deformation, nor spheres or other laws."""
+    W, q = pile()
+    problem = problem_of(W, q)
+    assert is_stacked(problem)
+    other = np.random.default_rng(5).permutation(len(q))
+    rows = (3 * other[:, None] + np.arange(3)).ravel()
+    assert is_stacked(problem_of(1e-7 * W[np.ix_(rows, rows)], q[other]))
+    assert not is_stacked(problem_of(W + 1e-3 * np.diag(np.diag(W)), q))
+    assert not is_stacked(am.SpherePacking(40, seed=1).problem().condensed())
+    assert not is_stacked(random_delassus(0, 10))
+    tresca = am.Tresca(np.full(len(q), 0.3))
+    assert not is_stacked(am.FrictionProblem.from_delassus(sparse.csr_array(W), q, tresca))
+
+
+def test_a_stack_goes_to_the_interior_point_after_a_chunk():
+    """After 20 sweeps, where all had 60 before; many at once have the same bits."""
+    problem = problem_of(*pile(20))
+    assert chunks_alone(problem, 1e-9) == 1
+    alone = am.drive(problem, tolerance=1e-9)
+    assert alone.converged
+    early = [step.stage for step in alone.convergence.history if step.iteration < 40]
+    assert "interior point" in early
+    assert np.array_equal(am.solve_many([problem], tolerance=1e-9)[0].r, alone.r)

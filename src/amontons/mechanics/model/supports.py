@@ -17,7 +17,7 @@ from ..meshes.mesh import Mesh, unknown
 from ..meshes.surfaces import pressure_load, surface_load
 from .parts import Body, BodyForce, Fix, Load, NodalForce, Pressure, Traction
 from .temperature import Temperature, changes, check_expansion
-from .timing import lasting
+from .timing import is_timed, lasting
 from .values import component_at, vector_at
 
 if TYPE_CHECKING:
@@ -45,6 +45,8 @@ class Prescribed:
     ) -> Prescribed:
         """Of all supports of a model, those of (x, t) at t = 0 unless they have a time."""
         values = with_held(prescribed_values(bodies, supports, beside), beside)
+        if not any(is_timed(s.value) for s in supports):
+            return cls(values, values.copy())  # functions of users are not called again
         same = tuple(replace(s, value=lasting(s.value)) for s in supports)
         return cls(values, with_held(prescribed_values(bodies, same, beside), beside))
 

@@ -145,8 +145,15 @@ def natural_error(indptr, indices, data, q, kind, parameters, rho, r):
     """
     if _all_zero(r):
         return _error_at_rest(q, kind, parameters, rho)
-    total, u = 0.0, np.empty_like(q)
+    u = np.empty_like(q)
     velocity_of_rows_inplace(0, len(kind), indptr, indices, data, q, r, u)
+    return error_of_motion(kind, parameters, rho, r, u)
+
+
+@njit(cache=True, error_model="numpy", fastmath={"contract"})
+def error_of_motion(kind, parameters, rho, r, u):
+    """`natural_error` where u = W r + q (nc, 3) is there already."""
+    total = 0.0
     for i in range(len(kind)):
         u0, u1, u2 = u[i, 0], u[i, 1], u[i, 2]
         if rho[i] > 0.0:

@@ -33,43 +33,22 @@ from ..sweeps.kernels import (
     flops_of_sweep,
 )
 from ..sweeps.local_contact import CLOSE, STEPS
-from .race import CALL, FIRST_CHUNKS, GROWTH, SHORTEST
-from .state import HISTORY_CONTACT, nanoseconds_of_sweep, visits
+from .race import CALL, FIRST_CHUNKS, GROWTH, SHORTEST, chunks_alone
+from .state import HISTORY_CONTACT, SIZES, is_brief, nanoseconds_of_sweep, visits
 from .tracks import DEPTH, LEAST
 
 Array = NDArray[np.float64]
 Counts = NDArray[np.int64]
-SHORT = 5e3  # nanoseconds of a sweep of a problem that is solved here whatever its tolerance
-COARSE, BLOCKS = 1e-4, 10_000  # tolerance from which, blocks of W to which larger ones are
-SIZES = 4096  # of problems whose counts are kept: time steps have the same again and again
 # Columns of what is told of a problem.
 SWEEPS, START, ERROR, WORST, CONTACT, HIDDEN, CHANGED, WORK = range(8)
 NO_NUMBERS = read_only(np.empty(0))
 
 
-def is_brief(problem: FrictionProblem, tolerance: float) -> bool:
-    """True where this stage is likely to be all that a problem needs.
-
-    If it is not, its sweeps are made once more: where they are few and as cheap as the calls of
-    the race, or where the goal is so near that most problems reach it in them.
-    """
-    blocks = len(problem.blocks.indices)
-    if _is_short(blocks, problem.contacts):
-        return True
-    return tolerance >= COARSE and blocks <= BLOCKS
-
-
 @lru_cache(maxsize=SIZES)
-def _is_short(blocks: int, contacts: int) -> bool:
-    """Whether a sweep costs no more than SHORT."""
-    return nanoseconds_of_sweep(blocks, contacts, HISTORY_CONTACT) <= SHORT
-
-
-@lru_cache(maxsize=SIZES)
-def sweeps_of_first_chunks(blocks: int, contacts: int) -> int:
-    """Sweeps of the chunks that the first track of the race has before all others."""
+def sweeps_of_first_chunks(blocks: int, contacts: int, chunks: int = FIRST_CHUNKS) -> int:
+    """Sweeps of so many first chunks, those that the first track has before all others."""
     cost, total, done = nanoseconds_of_sweep(blocks, contacts, HISTORY_CONTACT), 0.0, 0
-    for _ in range(FIRST_CHUNKS):
+    for _ in range(chunks):
         sweeps = max(LEAST, int(max(GROWTH * total, SHORTEST) / cost))
         total, done = total + sweeps * cost + CALL, done + sweeps
     return done
@@ -162,7 +141,8 @@ class Together:
             contacts, blocks = p.contacts, len(p.blocks.indices)
             before, full = ends[-1], _full(p).size
             ends.append((before[0] + contacts, before[1] + blocks, before[2] + full))
-            limits.append(sweeps_of_first_chunks(blocks, contacts))
+            chunks = chunks_alone(p, self.tolerance)
+            limits.append(sweeps_of_first_chunks(blocks, contacts, chunks))
         self.sizes, self.limits = np.array(ends, np.int64), np.array(limits, np.int64)
         self.beyond = np.array(
             [self.weakest if is_brief(p, self.tolerance) else math.inf for p in problems]

@@ -125,7 +125,7 @@ TRACKS = (
     Entry("momentum Gauss-Seidel", momentum, 0.1, 3.0, near=1.5),
     Entry("Gauss-Seidel, relaxation 1.6", partial(relaxed, 1.6), 0.02, 3.0),
     Entry("Gauss-Seidel, relaxation 0.9", partial(relaxed, 0.9), 0.02, 3.0),
-    Entry("interior point", interior_point, 0.05, 1.0, _relaxation_steps, _has_cone),
+    Entry("interior point", interior_point, 0.05, 1.0, _relaxation_steps, _has_cone, stacked=5),
     Entry("smoothing Newton", smoothing_newton, 0.15, 1.0, _steps(30), _has_cone),
     Entry("Anderson Gauss-Seidel, deep", polish, 0.1, 1.0, _deep_sweeps, _can_end, True),
     Entry("inexact Newton", inexact_newton, 0.3, 0.3, _at_joints, _has_joints),

@@ -20,6 +20,11 @@ believed less: its rest counts C / (GRACE F) times.  Besides
                 error was come by: sweeps of another kind cost less than Newton's from afar
     first       the track at the top of the table has a few chunks before all others, and more
                 while it promises the goal for less than to let them in costs
+    stacks      where most contacts share faces of rigid bodies, reactions are many more than
+                balances: the method that solves such a problem at rest in a few steps follows
+                the first chunk, unless the first track promises to be there for less, and has
+                what it usually needs before all others; where chunks are brief it waits with
+                the others, and comes before them
     nothing     where no track promises anything, the one that has cost least
 
     the end     where five times as much was spent as when the best error last halved, and a
@@ -43,8 +48,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...core.errors import SingularOperator
+from ...problem.friction import FrictionProblem
 from ..contract import Breakdown, Iterate, Iterates
-from .state import State
+from .state import State, is_brief, is_stacked
 
 Array = NDArray[np.float64]
 WINDOW = 0.7  # last part of a track's cost from which its rate is told
@@ -53,6 +59,7 @@ GRACE = 1.2  # times the cost at which a track has promised the goal: its promis
 # Logarithm of the way to the goal, over that of the way to the best error, up to which that is
 # near; multiple of the best error at which it is taken to have been come by.
 NEAR, ALMOST = 1.5, 2.0
+TENTH = 10.0  # to which the error falls in a chunk, for what comes after the first
 GROWTH = 0.2  # cost of a chunk, of what its track has cost
 CALL = 3e4  # nanoseconds that a chunk costs besides: Python, a judgement, bookkeeping
 SHORTEST = 6e4  # nanoseconds of a chunk at least, or the calls cost more than the sweeps
@@ -107,7 +114,8 @@ class Entry:
     rate, until it has cost them; None for sweeps.  near: what it is taken to need near the end,
     in whole ways at the mean rate of the best; 0: nothing is known.  last: it runs where no
     other promises the goal for that, and has no more than its share while another promises it
-    at all.
+    at all.  stacked: Newton steps that it usually takes on stacks of rigid blocks, where it
+    comes second; 0: it comes with the others.
     """
 
     name: str
@@ -118,6 +126,7 @@ class Entry:
     when: Callable[[State], bool] = always
     last: bool = False
     near: float = 0.0
+    stacked: int = 0
 
 
 @dataclass(eq=False)
@@ -177,6 +186,18 @@ class Track:
             promise = min(promise, entry.near * way - self.cost)
         unknown = self.cost < entry.share * total
         return min(promise, entry.optimism * total) if unknown else promise
+
+    def soon(self) -> float:
+        """Nanoseconds to the goal at the rate of the last chunk.
+
+        The first falls from afar, of which a tenth is what the next ones may be worth at most.
+        """
+        (before, higher), (cost, error) = self.path[-2:]
+        if error <= self.state.goal:
+            return 0.0
+        fall = higher / error if len(self.path) > 2 else min(higher / error, TENTH)
+        rest = math.log(error / self.state.goal) * (cost - before)
+        return rest / math.log(fall) if fall > 1.0 else math.inf
 
     def aim(self) -> None:
         """Promise the goal of the state anew."""
@@ -239,6 +260,11 @@ def whole_way(fall: list[tuple[float, float]], goal: float, near: float = NEAR) 
     return part * next(cost for cost, error in fall if error <= ALMOST * best)
 
 
+def chunks_alone(problem: FrictionProblem, tolerance: float) -> int:
+    """Chunks that the first track has before any other, whatever it promises."""
+    return 1 if not is_brief(problem, tolerance) and is_stacked(problem) else FIRST_CHUNKS
+
+
 @dataclass(eq=False)
 class Race:
     """The tracks of one problem; the first of the table leads."""
@@ -262,8 +288,15 @@ class Race:
 
         A tighter goal that is sent counts from there on.
         """
+        tolerance, alone = self.state.target.tolerance, FIRST_CHUNKS
         while self.tracks and self._is_first():
             yield from self._go_on(self.tracks[0])
+            if self.chunks == 1:
+                alone = chunks_alone(self.state.problem, tolerance)
+                if alone == 1:
+                    yield from self._on_stacks()
+        if alone > 1:
+            yield from self._on_stacks()
         self.enter()
         while self.tracks and not self._is_lost():
             yield from self._go_on(self._next())
@@ -276,11 +309,28 @@ class Race:
         entry = ENTRY + ENTRY_BLOCK * len(self.state.problem.blocks.indices)
         return len(first.errors) <= FIRST_CHUNKS or first.rest(self.total) < entry
 
+    def _on_stacks(self) -> Iterates:
+        """What is quick on stacks beside the first track, until it has had what it needs."""
+        state = self.state
+        if not (self.tracks and state.is_stacked):
+            return
+        first = self.tracks[0]
+        for entry in [e for e in self.table if e.stacked and e.when(state)]:
+            needed = entry.stacked * (state.relaxation_cost + CALL)
+            track = Track(entry, state)
+            self.tracks.append(track)
+            while track in self.tracks and track.cost < needed:
+                sooner = first in self.tracks and first.soon() < needed - track.cost
+                yield from self._go_on(first if sooner else track)
+
     def enter(self) -> None:
         """Let all others of the table in; what tells which of them run costs something too."""
         state = self.state
         self.shows_all = state.problem.gains_energy
-        self.tracks += [Track(e, state) for e in self.table[1:] if e.when(state)]
+        there = [track.entry for track in self.tracks]
+        for entry in self.table[1:]:
+            if entry not in there and entry.when(state):
+                self.tracks.append(Track(entry, state))
 
     def _go_on(self, track: Track) -> Iterates:
         """A chunk of a track, which leaves where it has ended."""

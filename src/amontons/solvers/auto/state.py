@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, replace
-from functools import cached_property
+from functools import cached_property, lru_cache
 
 import numpy as np
 from numpy.typing import NDArray
@@ -18,6 +18,7 @@ from ...problem.friction import FrictionProblem
 from ...problem.judge.measures import natural_error
 from ...problem.law import Coulomb
 from ..contract import Iterate, Target
+from ..newton.faces import are_shared
 from ..newton.inexact import InexactNewton
 from ..newton.joints import Joints
 from ..newton.semismooth import Condensed, SemismoothNewton
@@ -37,6 +38,9 @@ NEWTON_CONTACT = 500.0
 DENSE_STEP = 0.05  # per cube of the unknowns
 LIGHT = 1e6  # nanoseconds of a step up to which its cost is told without looking for faces
 DENSE = 0.5  # share of blocks of W above which it comes from a mesh
+SHORT = 5e3  # nanoseconds of a sweep of a problem that is brief whatever its tolerance
+COARSE, BLOCKS = 1e-4, 10_000  # tolerance from which, blocks of W to which larger ones are
+SIZES = 4096  # of problems whose counts are kept: time steps have the same again and again
 FEW = 30  # contacts up to which W may be full as all are on one rigid body
 
 
@@ -60,6 +64,33 @@ def nanoseconds_of_sweep(blocks: int, contacts: int, more: float = 0.0) -> float
     """Cost of a sweep with so many stored blocks of W; more: per contact, for acceleration."""
     each = FULL_BLOCK if is_full(blocks, contacts) else SWEEP_BLOCK
     return each * blocks + (SWEEP_CONTACT + more) * contacts
+
+
+def is_brief(problem: FrictionProblem, tolerance: float) -> bool:
+    """True where the first chunks of the first track are likely to be all that a problem needs.
+
+    They are made compiled then, and once more if they are not: where they are few and as cheap
+    as the calls of the race, or where the goal is so near that most problems reach it in them.
+    """
+    blocks = len(problem.blocks.indices)
+    if _is_short(blocks, problem.contacts):
+        return True
+    return tolerance >= COARSE and blocks <= BLOCKS
+
+
+@lru_cache(maxsize=SIZES)
+def _is_short(blocks: int, contacts: int) -> bool:
+    """Whether a sweep costs no more than SHORT."""
+    return nanoseconds_of_sweep(blocks, contacts, HISTORY_CONTACT) <= SHORT
+
+
+def is_stacked(problem: FrictionProblem) -> bool:
+    """True under Coulomb's law where most contacts share faces of rigid bodies.
+
+    At rest the relaxation of the interior point is solved in a few steps there.
+    """
+    has_relaxations = isinstance(problem.law, Coulomb) and not problem.gains_energy
+    return has_relaxations and are_shared(problem)
 
 
 @dataclass(eq=False)
@@ -101,6 +132,11 @@ class State:
         exact = Condensed.in_blocks(self.problem, EXACT_WORK)
         return SemismoothNewton if exact else InexactNewton
 
+    @cached_property
+    def is_stacked(self) -> bool:
+        """See `is_stacked`."""
+        return is_stacked(self.problem)
+
     # ---------------------------------------------------------------- tools
     @cached_property
     def work(self) -> Workspace:
@@ -121,9 +157,10 @@ class State:
     def relaxation_cost(self) -> float:
         """Nanoseconds of a step of the interior point, less than Newton's by shared faces.
 
-        Of light steps faces are looked for when they are taken, which may never be.
+        Of light steps faces are looked for when they are taken, which may never be, unless
+        there are any.
         """
-        if self.step_cost < LIGHT:
+        if self.step_cost < LIGHT and not self.is_stacked:
             return self.step_cost
         less = self.work.symbolic.products - self.work.sharing.products
         return self.step_cost - PRODUCT * less

@@ -29,16 +29,17 @@ from ..sweeps.on_bodies import GROUND, driven_inplace, felt_inplace
 from .block_lu import Symbolic, analyse_doubled, factorise_inplace, found, solve_inplace
 from .cone_steps import (
     advance_inplace,
-    centering,
     changes_inplace,
+    gap_left,
     residual_inplace,
     right_side_inplace,
     room,
     scaled_blocks_inplace,
 )
-from .interior_point import BOUNDARY, ENOUGH, SHORT, STALLED
+from .interior_point import ENOUGH, SHORT, STALLED
 
 Array = NDArray[np.float64]
+BOUNDARY = 0.99  # part of the way to the boundary of the cones that a step goes
 SOFT = 1e-12  # of bonds, relative: E of a row that has none
 
 
@@ -253,7 +254,7 @@ def relax_on_bodies_inplace(  # noqa: PLR0913
                 return count
             length = min(1.0, length * (1.0 if phase == 0 else BOUNDARY))
             if phase == 0:
-                sigma = centering(x, y, dx, dy, able, length, total)
+                sigma = gap_left(x, y, dx, dy, able, length, total) ** 3
         short = short + 1 if length < SHORT else 0
         if short > STALLED:
             return count

@@ -25,7 +25,6 @@ from ...linear.block_kernels import velocity_of_rows_inplace
 from .block_lu import factorise_inplace, found, solve_inplace
 from .faces import SIX
 
-REFINED = 2  # solutions with one factor
 HIDDEN = 1e-15  # of the diagonal of G, what rounding leaves of a direction that it lacks
 STIFF = 1e13  # D^-1 at most, of the largest entry of X
 
@@ -246,15 +245,18 @@ def factorise_faces_inplace(faces, E, inverse, symbolic, U, L, memory):  # noqa:
 
 
 @njit(cache=True, error_model="numpy")
-def step_by_faces_inplace(W, faces, E, inverse, symbolic, U, L, memory, f, dr, du):  # noqa: PLR0913
-    """dr = (W + E)^-1 f and du = W dr, (nc, 3), by that factor; W: indptr, indices, data."""
+def step_by_faces_inplace(W, faces, E, inverse, symbolic, U, L, memory, f, solutions, dr, du):  # noqa: PLR0913
+    """dr = (W + E)^-1 f and du = W dr, (nc, 3), by that factor; W: indptr, indices, data.
+
+    solutions: with the factor, each after the first of what the last one has missed.
+    """
     matrix, _, B, rows, stiffness, pivots, _ = memory
     order, upper_start, upper, lower_start, lower = symbolic
     factor = order, upper_start, upper, lower_start, lower, U, L, pivots
     h, t = np.empty((len(pivots), 3)), np.empty((len(pivots), 3))
     zero, rest = np.zeros(f.shape), np.empty(f.shape)
     dr[:] = du[:] = 0.0
-    for _ in range(REFINED):
+    for _ in range(solutions):
         missed_inplace(E, f, dr, du, rest)
         add_step_inplace(faces, inverse, (B, rows, stiffness), matrix, factor, rest, h, t, dr)
         velocity_of_rows_inplace(0, len(f), W[0], W[1], W[2], zero, dr, du)

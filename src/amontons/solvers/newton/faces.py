@@ -147,6 +147,25 @@ def _faces(indptr, indices, data, rho, order, starts):
 
 
 @njit(cache=True, error_model="numpy")
+def _on_faces(indptr, indices, data, rho, order, starts):
+    """How many contacts are in sets, order[starts...], whose first three share a face."""
+    at, component = np.empty(SIX, np.int64), np.empty(SIX, np.int64)
+    factor, rows, total = np.zeros((SIX, SIX)), np.zeros((SIX, 3)), 0
+    for s in range(len(starts) - 1):
+        begin, count, k = starts[s], 0, 0
+        if starts[s + 1] - begin < FEWEST:
+            continue
+        while k < FEWEST and count >= 0 and rho[order[begin + k]] > 0.0:
+            count = _taken(
+                indptr, indices, data, order[begin + k], at, component, factor, count, rows
+            )
+            k += 1
+        if k == FEWEST and count >= 0:
+            total += starts[s + 1] - begin
+    return total
+
+
+@njit(cache=True, error_model="numpy")
 def _pattern(indptr, indices, face, first, contacts):
     """(place, indptr, indices) of X in blocks of three, columns ascending."""
     nc = len(indptr) - 1
@@ -283,18 +302,37 @@ NONE = Faces(
 )  # fmt: skip
 
 
-def _sets(indptr: Any, indices: Any) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
-    """(order, starts): contacts of equal pattern one behind the other, in their own order."""
+@njit(cache=True, error_model="numpy")
+def _sets(indptr, indices):
+    """(order, starts): contacts of equal pattern one behind the other, in their own order.
+
+    Equal are those whose columns, mixed by splitmix64, have the same sum.
+    """
     nc = len(indptr) - 1
-    lengths = np.diff(indptr)
-    marks = np.random.default_rng(1).integers(0, 2**62, nc).astype(np.uint64)
     sums = np.zeros(nc, np.uint64)
-    filled = np.flatnonzero(lengths)
-    if filled.size:
-        sums[filled] = np.add.reduceat(marks[indices], indptr[filled])
-    order = np.argsort(sums, kind="stable")
-    ends = np.flatnonzero(np.diff(sums[order])) + 1
-    return order, np.concatenate([[0], ends, [nc]])
+    for i in range(nc):
+        for k in range(indptr[i], indptr[i + 1]):
+            x = (np.uint64(indices[k]) + np.uint64(1)) * np.uint64(0x9E3779B97F4A7C15)
+            x = (x ^ (x >> np.uint64(30))) * np.uint64(0xBF58476D1CE4E5B9)
+            x = (x ^ (x >> np.uint64(27))) * np.uint64(0x94D049BB133111EB)
+            sums[i] += x ^ (x >> np.uint64(31))
+    order, starts = np.argsort(sums, kind="mergesort"), [0]
+    for k in range(1, nc):
+        if sums[order[k]] != sums[order[k - 1]]:
+            starts.append(k)
+    starts.append(nc)
+    return order, np.array(starts)
+
+
+def are_shared(problem: FrictionProblem) -> bool:
+    """True where most contacts share faces of rigid bodies, told once of a W by three each."""
+    return problem.kept(_are_shared)
+
+
+def _are_shared(problem: FrictionProblem) -> bool:
+    b, rho = problem.blocks, problem.kernel_data[6]
+    order, starts = _sets(b.indptr, b.indices)
+    return 2 * _on_faces(b.indptr, b.indices, b.data, rho, order, starts) > problem.contacts
 
 
 def _work(symbolic: Symbolic, contacts: int, blocks: int) -> int:
@@ -358,4 +396,4 @@ class FaceMatrix:
         return cls(made, symbolic)
 
 
-__all__ = ["NONE", "SIX", "FaceMatrix", "Faces"]
+__all__ = ["NONE", "SIX", "FaceMatrix", "Faces", "are_shared"]
