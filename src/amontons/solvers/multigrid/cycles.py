@@ -250,7 +250,7 @@ class _Run:
 
     def few_changed(self) -> bool:
         """True where hardly any contact has changed its state since the tangent was renewed."""
-        closed = np.count_nonzero(self.contacts.state >= CLOSED)
+        closed = int(np.count_nonzero(self.contacts.state >= CLOSED))
         return self.changed() <= FEW * closed
 
     def smooth(self, x: Array, backward: bool) -> None:
