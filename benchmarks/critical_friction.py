@@ -230,8 +230,8 @@ def main():
                   f"{len(ratios)} of them: median {np.median(ratios):.3f}, at most "
                   f"{max(ratios):.6f}. Bounds of `am.critical_friction` are within 1e-3."]
     lines += ["", "## Bodies", "", "Every load, W given, with the work of at most "
-              f"{options.limit:g} s; until mu 0.3 alone is proved; `am.uniqueness` at mu 0.3, "
-              "which looks for an upper bound too.", "",
+              f"{options.limit:g} s; until mu 0.3 alone is proved; `am.uniqueness` at mu "
+              "0.3.", "",
               "| body | contacts | lower | upper | s | mu 0.3 proved, s | verdict at mu 0.3 | "
               "s |", "|---|---|---|---|---|---|---|---|", *of_bodies(levels, options.limit),
               "", "## Random problems in 3D", ""]  # fmt: skip

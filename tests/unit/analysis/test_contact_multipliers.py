@@ -4,11 +4,13 @@ import numpy as np
 import pytest
 
 import amontons as am
+from amontons.analysis.certificates import bounds_in_space
 from amontons.analysis.certificates.contact_multipliers import (
     ContactMultipliers,
     contact_multipliers,
     holds,
 )
+from amontons.analysis.certificates.critical_friction import critical_friction
 from amontons.analysis.certificates.energy_bound import energy_bound
 from amontons.core.clock import Deadline
 from amontons.core.errors import TimeUp
@@ -107,7 +109,10 @@ def test_the_cube_between_its_bounds():
     bounds = am.critical_friction(model)
     assert 0.58 < bounds.lower < bounds.upper < 0.78
     assert bounds.criterion == "contact multipliers"
-    assert am.uniqueness(model).verdict.value == "unique_every_load"
+    verdict = am.uniqueness(model)
+    assert verdict.verdict.value == "unique_every_load"
+    assert verdict.lower > 0.5
+    assert np.isinf(verdict.upper)  # nobody needs it then, and it takes most of the time
     W = model.assemble().condensed().W
     assert bounds.lower > 1.3 * energy_bound(np.asarray(W), np.ones(25))[0]
 
@@ -162,3 +167,22 @@ def test_a_search_that_is_cut_leaves_time_for_its_proof():
         assert found.t > 0
         told.append(found.t)
     assert len(told) > 10
+
+
+def test_a_search_of_many_contacts_that_is_cut_leaves_time_for_its_proof():
+    """The search of a part of them once took all, and what it had found was thrown away."""
+    W, mu, _ = random_problem(0, 3, contacts=80)
+    for seconds in (4e-3, 1e-2, 4e-2):
+        assert contact_multipliers(W, mu / mu.max(), Deadline.counted(seconds)).t > 0
+
+
+def test_only_where_the_energy_gives_no_bound_is_w_called_singular(monkeypatch):
+    _, _, problem = random_problem(3, 3, contacts=3)
+    ones = np.ones(3)
+    nothing = ContactMultipliers(0.0, ones, ones, ones, np.zeros((3, 2)))
+    monkeypatch.setattr(bounds_in_space, "contact_multipliers", lambda *_, **__: nothing)
+    bounds = critical_friction(problem, brief=True)
+    assert bounds.criterion == "energy"
+    assert bounds.reason == bounds_in_space.NOT_PROVED
+    singular = am.FrictionProblem.from_delassus(np.ones((6, 6)), np.ones((2, 3)), ones[:2])
+    assert "W is singular" in critical_friction(singular).reason

@@ -20,7 +20,7 @@ from .status_pieces import Pieces
 
 Array = NDArray[np.float64]
 LOWER = 0.7  # part of the time for the multipliers: many contacts need it
-NOT_PROVED = "multipliers of every contact were found, but no proof in time or within rounding"
+NOT_PROVED = "multipliers of every contact gave no proof in time or within rounding"
 ROOMS = (1e-12, 1e-10, 1e-9, 1e-8, 1e-7, 1e-6)  # above t, where the determinant is negative
 
 
@@ -39,7 +39,7 @@ def lower_bound(
         return None, str(reason)
     if found.t > 0:
         return found.unscaled(pieces.scale), ""
-    return None, NOT_PROVED if found.expected > 0 else "W is singular"
+    return None, NOT_PROVED
 
 
 def upper_bound(pieces: Pieces, deadline: Deadline) -> DiscPiece | None:

@@ -53,6 +53,7 @@ ROOMS = (1e-4, 1e-3, 5e-3, 2e-2, 0.1)  # by which less is proved than was found
 SINGLE = 0.25  # of the work of RATE: half the length, and products of matrices
 PROOF = 1.0  # operations of a proof per cube of the rows
 PROOFS = 2.0  # for which the search leaves time
+COARSE = 0.5  # part of the time for a part of the contacts
 
 
 def contact_multipliers(
@@ -61,7 +62,8 @@ def contact_multipliers(
     """Multipliers for W (k d, k d) and friction in the proportions shape (k,).
 
     wanted: a t that is enough.  Contacts with W_ii = 0 are left out.  Raises TimeUp where the
-    deadline is nearer than a first evaluation; later it ends the search, in time for a proof.
+    deadline is nearer than two proofs and the energy bound of the first contacts, some 60;
+    later it ends the search, in time for a proof.
     """
     k = len(shape)
     d = len(W) // max(k, 1)
@@ -89,13 +91,17 @@ def _searched(form: _Form, deadline: Deadline, wanted: float) -> Array:
         steps = STEPS
     else:
         coarse, weight = form.thinned()
-        x = form.interpolated(_searched(coarse, deadline, np.inf), weight)
+        x = form.interpolated(_searched(coarse, deadline.share(COARSE), np.inf), weight)
         steps = FINE_STEPS if len(form.W) > MANY else STEPS
         form = form.for_search(x)
         x = form.shifted(x, deadline)
     for soft in SOFT:
         x = form.improved(x, soft, steps, deadline, wanted * (1 + 10 * ROOMS[0]))
     return x
+
+
+def _value(tried: tuple[float, Array]) -> float:
+    return tried[0]
 
 
 @dataclass(eq=False)
@@ -184,25 +190,33 @@ class _Form(Pencil):
         return np.concatenate([values.ravel(), (weight @ x[3 * n :].reshape(n, -1)).ravel()])
 
     def shifted(self, x: Array, deadline: Deadline) -> Array:
-        """x with the shift of alpha that does best, tau, sigma and f less varied if need be."""
-        k = self.contacts
+        """x with the shift of alpha that does best, tau, sigma and f less varied if need be.
+
+        Without time the best that was tried, or without variation: A is W then.
+        """
+        tried: list[tuple[float, Array]] = []
         for share in SHARES:
-            y = x.copy()
-            for part in (slice(0, k), slice(k, 2 * k)):
-                y[part] = x[:k].mean() + share * (x[part] - x[:k].mean())
-            y[3 * k :] *= share
-            tried = []
+            y, tried = self.varied(x, share), []
             for shift in SHIFTS:
-                deadline.pay(self.operations)
+                if not deadline.affords(self.operations):
+                    return min(tried, key=_value)[1] if tried else self.varied(x, SHARES[-1])
+                deadline.spend(self.operations)
                 z = y.copy()
-                z[2 * k : 3 * k] += shift
-                tried.append((self.value(z, SOFT[-1], gradient=False)[0], shift))
+                z[2 * self.contacts : 3 * self.contacts] += shift
+                tried.append((self.value(z, SOFT[-1], gradient=False)[0], z))
                 if tried[-1][0] == INDEFINITE:
                     break
             else:
-                y[2 * k : 3 * k] += min(tried)[1]
-                return y
+                return min(tried, key=_value)[1]
         return x
+
+    def varied(self, x: Array, share: float) -> Array:
+        """x with so much of the variation of tau, sigma and f."""
+        k = self.contacts
+        y, mean = x.copy(), x[:k].mean()
+        y[: 2 * k] = mean + share * (x[: 2 * k] - mean)
+        y[3 * k :] *= share
+        return y
 
     # ------------------------------------------------------------- what is minimised
     def parts(self, x: Array) -> tuple[Array, Array, Array, Array]:

@@ -113,7 +113,8 @@ def critical_friction(
 
     gap: relative distance of the bounds that is good enough.  time_limit: seconds; without it
     operations are counted, as many as take about SECONDS.  first: a friction of interest, which
-    is proved to be safe before others if it can be; in 3D a lower bound above it is enough.
+    is proved to be safe before others if it can be; in 3D a lower bound above it is enough,
+    and no upper one is looked for then.
     brief: without what takes long, branches in 2D and an upper bound in 3D.
     Raises UnsupportedForm under Tresca's law.
     """
@@ -148,15 +149,15 @@ def _in_space(
     pieces: Pieces, energy: float, deadline: Deadline, first: float | None, began: float, *,
     brief: bool,
 ) -> CriticalFriction:  # fmt: skip
-    """Bounds of a 3D problem, brief: without an upper one."""
+    """Bounds of a 3D problem, brief: without an upper one; no more once `first` is safe."""
     by, late = None, ""
-    if first is None or energy <= first:
+    if energy > 0 and (first is None or energy <= first):
         by, late = space.lower_bound(pieces, deadline.share(space.LOWER), first)
     lower, criterion = energy, "energy" if energy > 0 else "none"
     if by is not None and by.t > energy:
         lower, criterion = by.t, "contact multipliers"
     upper, witness = np.inf, None
-    search = energy > 0 and not brief
+    search = energy > 0 and not brief and (first is None or lower <= first)
     found = space.upper_bound(pieces, deadline) if search else None
     if found is not None:
         upper = found.t

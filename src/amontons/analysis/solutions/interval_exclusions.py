@@ -29,7 +29,8 @@ class Exclusions:
 
     excluded: as in `Proof`, with multipliers (k, nc, 2); left: the complete patterns that are
     not; loads (2, nc, 2): at both ends of the interval, which begins or ends a little inside
-    where there is no load.  All in the units of the problem.
+    where there is no load.  middles (pieces, nc, 2): reactions r_N, r_T in the middle of each
+    piece that was given, in their order.  All in the units of the problem.
     """
 
     excluded: tuple[str, ...]
