@@ -1,7 +1,8 @@
 """Cone problems by classes: FCLib files, packings, lattices, rolling piles, blocks, meshes.
 
 Every generator takes a seed; sizes are chosen so that a class has small and large problems.
-`classes(folder, seed)` yields (class, name, problem), all in Delassus form.
+`classes(folder, seed)` yields (class, name, problem), all in Delassus form; `unseen(seed)` the
+same of classes on which hardly a constant of a method was chosen (`race.py` says which).
 """
 
 from functools import cached_property
@@ -159,6 +160,50 @@ def arch(stones, points=2, radius=1.0, thickness=0.2, width=0.3):
     return made
 
 
+def boxes(levels, count, points, seed):
+    """Boxes of random widths on boxes, faces of points by points contacts, no head joints."""
+    random, made = np.random.default_rng([seed, 6]), Blocks()
+    height, depth, below = 0.2, 0.3, [(-1, -10.0, 10.0)]
+    for level in range(levels):
+        low, now, z = 0.0, [], level * height
+        for _ in range(count):
+            width, low = random.uniform(0.25, 0.5), low + random.uniform(0, 0.03)
+            high = low + width
+            number = made.block(((low + high) / 2, 0, z + height / 2), (width, depth, height))
+            for other, left, right in below:
+                a, b = max(low, left), min(high, right)
+                if b - a > 0.02:
+                    half, centre = ((b - a) / 2, 0, 0), ((a + b) / 2, 0, z)
+                    made.face(number, other, centre, (0, 0, 1), half, (0, depth / 2, 0),
+                              (points, points))  # fmt: skip
+            now.append((number, low, high))
+            low = high
+        below = now
+    return made
+
+
+def logs(layers, count, seed, thickness=0.05):
+    """Logs laid crosswise, two contacts where two of them cross."""
+    random, made, below = np.random.default_rng([seed, 7]), Blocks(), []
+    for layer in range(layers):
+        z, across, now = layer * thickness, layer % 2 == 1, []
+        places = np.linspace(0.06, 0.94, count) + random.uniform(-0.02, 0.02, count)
+        for place in places:
+            x, y = (place, 0.5) if across else (0.5, place)
+            sides = (thickness, 1, thickness) if across else (1, thickness, thickness)
+            number = made.block((x, y, z + thickness / 2), sides)
+            ends = [(-1, 0.5, (0.4, 0, 0))] if layer == 0 else [
+                (other, at, (0.01, 0, 0) if random.random() < 0.5 else (0, 0.01, 0))
+                for other, at in below
+            ]  # fmt: skip
+            for other, at, half in ends:
+                where = (place, at, z) if across else (at, place, z)
+                made.face(number, other, where, (0, 0, 1), half, (0, 0, 0), (2, 1))
+            now.append((number, place))
+        below = now
+    return made
+
+
 # --------------------------------------------------------------------- meshes
 def two_bodies(cells, mu, seed):
     """A block pressed on a wider one, and moved and turned at random: W is full."""
@@ -240,3 +285,32 @@ def classes(folder, seed):
     for kind, problems in made.items():
         for name, problem in problems:
             yield kind, name, problem.condensed()
+
+
+def unseen(seed):
+    """(class, name, problem) of spheres of several sizes, boxes, logs and rolling spheres."""
+    random = np.random.default_rng([seed, 8])
+
+    def spheres(kind, low, high, spin, **more):
+        count, mu = int(10 ** random.uniform(low, high)), float(random.uniform(0.1, 0.8))
+        made = SpherePacking(count, mu=mu, seed=int(random.integers(10**6)), **more)
+        problem = spinning(made, spin, seed) if spin else made.problem(STEP)
+        return kind, f"{kind} {count} mu {mu:.2f} spin {spin:.3g}", problem
+
+    for k in range(6):
+        spin = float(random.uniform(1, 10)) if k % 2 else 0.0
+        spread = float(random.choice([0.2, 0.35, 0.45]))
+        yield spheres("sizes", 1.2, 2.6, spin, spread=spread)
+    for kind in ("boxes", "logs"):
+        for k in range(5):
+            mu, spin = float(random.uniform(0.1, 0.8)), float(random.choice([0.0, 0.02, 0.5]))
+            if kind == "boxes":
+                a, b, c = (int(n) for n in random.integers((2, 1, 2), (8, 6, 4)))
+                made, push = boxes(a, b, c, seed + k), float(random.choice([0.0, 20.0, 60.0]))
+            else:
+                a, b, c = (int(n) for n in random.integers((3, 2, 2), (10, 6, 3)))
+                made, push = logs(a, b, seed + k), 0.0
+            name = f"{kind} {a}x{b}x{c} mu {mu:.2f} spin {spin:g} push {push:g}"
+            yield kind, name, made.problem(mu, (push, 0.0, 0.0), spin, seed + k)
+    for _ in range(3):
+        yield spheres("rolling", 1.6, 2.5, float(random.uniform(2, 30)))

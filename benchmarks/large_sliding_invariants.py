@@ -76,8 +76,8 @@ for at a random state: with that the tangent was up to 2e-1 off, and the residua
 2e-7 at these states, and of 2e-4 in two states of 2D self contact of second order, where less
 than 1e-3 of a node faces the master; those of fourth order have 1.3e-7 and 9e-8 there, and
 3.7e-10 and 8.8e-10 with a tenth of the step; these of sixth 1.7e-10 and 2.0e-10.
-What is above 1e-7 in 3D self contact of first order is 2.9e-7 with steps of 1e-6 and 3e-6, and
-2.3e-10 with 3e-7: a kink within the difference, which is not seen by what is compared.
+Second derivatives jump where a corner of one facet passes an edge of the other, and tangents
+told by differences across that have errors of first order in the step.
 
 A node that faced nobody at the end of the last step and does now counts its motion against the
 facets that it meets now, which take along the place where it was (`contact.newcomers`): it

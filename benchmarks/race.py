@@ -1,8 +1,10 @@
 """Auto beside the best of its own methods in hindsight, on classes of cone problems.
 
     python benchmarks/race.py [--seed 7] [--cap 3] [--traces FILE] [--kept] [--tune COUNT]
+    python benchmarks/race.py --unseen [...]
 
-The problems are those of `classes.py`.  Every track of the table in `solvers/auto/portfolio.py`
+The problems are those of `classes.py`; --unseen takes those on which no constant was chosen but
+`Entry.again`, that one at other seeds.  Every track of the table in `solvers/auto/portfolio.py`
 runs alone on each of them for at most `cap` CPU seconds, those of Newton's kind from 60
 accelerated sweeps, as in the race; the *oracle* is the fastest of them.  Auto is a whole solve,
 judge and bookkeeping included, for at most `cap` or PATIENCE times the oracle; like a track it
@@ -11,7 +13,7 @@ is asked for the error in the sum.  CPU seconds, one thread, blocks and diagonal
 --tune COUNT draws so many constants of the race at random and simulates it on the recorded
 traces, where tracks do not exchange reactions: the best for all classes, and for all but one,
 which is then scored with them.
-Writes results/race.md beside this file.
+Writes results/race.md beside this file, or results/race_unseen.md.
 """
 
 import os
@@ -29,7 +31,7 @@ from collections import defaultdict
 from pathlib import Path
 
 import numpy as np
-from classes import classes
+from classes import classes, unseen
 from machine import describe
 
 import amontons as am
@@ -147,10 +149,11 @@ def solved(problem, tolerance, cap):
     return best
 
 
-def record(folder, seed, cap, path):
+def record(problems, cap, path):
     """Traces of all tracks and times of Auto on all problems, kept in a file as they come."""
     out = []
-    for kind, name, problem in classes(folder, seed):
+    for kind, name, given in problems:
+        problem = given.condensed()
         if problem.contacts < 20:
             continue
         _ = problem.kernel_data, problem.q_norm, problem.blocks.eliminated
@@ -160,7 +163,7 @@ def record(folder, seed, cap, path):
             solved(problem, 1e-8, 1.0)
         state = State(problem, Target(1e-8), np.zeros((problem.contacts, 3)))
         row = {"kind": kind, "name": name, "contacts": problem.contacts, "traces": {},
-               "needs": {}, "stacked": {}}  # fmt: skip
+               "needs": {}, "trials": {}, "stacked": {}}  # fmt: skip
         fastest = math.inf
         for entry in ALONE:
             most = min(cap, max(0.2, 8 * fastest))
@@ -172,6 +175,8 @@ def record(folder, seed, cap, path):
             fastest = min(fastest, crossing(found, 1e-8))
             if found is not None and entry.needs is not None:
                 row["needs"][entry.name] = entry.needs(state)
+            if found is not None and entry.trial is not None:
+                row["trials"][entry.name] = entry.trial(state)
             if found is not None and entry.stacked and state.is_stacked:
                 each = state.relaxation_cost + rules.CALL
                 row["stacked"][entry.name] = entry.stacked * each
@@ -202,6 +207,7 @@ CONSTANTS = {
     "optimisms": {e.name: e.optimism for e in ALONE},
     "needs": {e.name: 1.0 for e in ALONE if e.needs is not None},
     "near": rules.NEAR, "nears": {e.name: e.near for e in ALONE if e.near},
+    "agains": {e.name: e.again for e in ALONE if e.trial is not None},
 }  # fmt: skip
 LAST = {e.name for e in ALONE if e.last}
 
@@ -276,6 +282,8 @@ def simulated(row, goal, c):
         likely = c["nears"].get(name, 0.0) * mean
         if track.cost < likely:
             promise = min(promise, likely - track.cost)
+        if name in row["trials"]:
+            promise = min(promise, c["agains"][name] * max(track.cost, row["trials"][name]))
         unknown = track.cost < c["shares"][name] * total
         return min(promise, c["optimisms"][name] * total) if unknown else promise
 
@@ -330,7 +338,7 @@ GRID = {
     "grace": (1.0, 1.2, 1.5, 2.0, 4.0),
     "shares": (0.0, 0.02, 0.05, 0.1, 0.15, 0.2, 0.3), "optimisms": (0.1, 0.3, 1.0, 3.0, 10.0),
     "needs": (0.3, 0.5, 0.7, 1.0, 1.5, 2.0), "near": (1.0, 1.2, 1.5, 2.0),
-    "nears": (0.0, 1.0, 1.5, 2.0, 3.0),
+    "nears": (0.0, 1.0, 1.5, 2.0, 3.0), "agains": (2.0, 3.0, 5.0, 8.0, math.inf),
 }  # fmt: skip
 
 
@@ -444,20 +452,24 @@ def main():
     parser.add_argument("--folder", type=Path, default=SHARED / "data/fclib")
     parser.add_argument("--seed", type=int, default=7)
     parser.add_argument("--cap", type=float, default=3.0)
-    parser.add_argument("--traces", type=Path, default=HERE / "results/race.pickle")
+    parser.add_argument("--unseen", action="store_true")
+    parser.add_argument("--traces", type=Path)
     parser.add_argument("--kept", action="store_true", help="take the traces of the last run")
     parser.add_argument("--tune", type=int, default=0, metavar="COUNT")
     chosen = parser.parse_args()
+    name = "race_unseen" if chosen.unseen else "race"
+    traces = chosen.traces or HERE / f"results/{name}.pickle"
+    problems = unseen(chosen.seed) if chosen.unseen else classes(chosen.folder, chosen.seed)
     if chosen.kept:
-        rows = pickle.loads(chosen.traces.read_bytes())
+        rows = pickle.loads(traces.read_bytes())
     else:
-        rows = record(chosen.folder, chosen.seed, chosen.cap, chosen.traces)
+        rows = record(problems, chosen.cap, traces)
     command = f"python benchmarks/race.py --seed {chosen.seed} --cap {chosen.cap:g}"
+    command += " --unseen" if chosen.unseen else ""
     command += f" --tune {chosen.tune}" if chosen.tune else ""
     machine = "; ".join(f"{k} {v}" for k, v in describe().items())
     text = page(rows, machine, command, crossed(rows, chosen.tune) if chosen.tune else [])
-    (HERE / "results/race.md").write_text(text)
-
+    (HERE / f"results/{name}.md").write_text(text)
 
 
 if __name__ == "__main__":

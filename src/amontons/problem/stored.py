@@ -98,7 +98,7 @@ class Matrices(Problem):
             if known is v and not v.flags.writeable:
                 return product
         assert self.M is not None
-        product = read_only(self.M @ v)
+        product = read_only(self.M @ v if v.any() else np.zeros(len(v)))  # all starts at rest
         if v.base is None and not v.flags.writeable:
             self._products[:] = [(v, product)]
         return product

@@ -281,3 +281,24 @@ def test_a_corner_that_is_inside_out_is_named_where_no_integration_point_is():
         "there, in body 'lower'" in problem.remark(v)  # fmt: skip
     assert "pressed to det F = 0.0536" in problem.remark(v)
     assert "corner" not in problem.remark(v / 2)
+
+
+@pytest.mark.parametrize(
+    ("law", "depth", "told"),
+    [(am.LinearElastic(1.0, 0.3), 0.1, True), (NEO, 0.1, True), (NEO, 1e-3, False)],
+)
+def test_bodies_that_overlap_as_they_are_given_get_a_word(law, depth, told):
+    """With place and depth, static and in time; a press fit is thin, or says its clearance."""
+    heavy = replace(law, density=1.0)
+    parts = [replace(body, material=heavy) for body in bodies(over=-depth)]
+    one = model(parts, am.Fix("upper.top", 0))
+    names = [w.name for w in am.solve(one).warnings]
+    assert ("overlap-at-start" in names) == told
+    step = next(iter(am.evolve(one, am.MoreauJean(0.1), until=0.1)))
+    found = [w for w in step.warnings if w.name == "overlap-at-start"]
+    assert bool(found) == told
+    if told:
+        assert "by 0.1 at (" in found[0].message
+        meant = replace(one.contacts[0], clearance=-depth)
+        said = replace(one, contacts=[meant])
+        assert "overlap-at-start" not in [w.name for w in am.solve(said).warnings]

@@ -210,6 +210,38 @@ def test_broken_promises_count_less():
     assert spent["steady"] > 150
 
 
+def plateau(state):
+    """A method that stands for thirty chunks, then falls as if it had always."""
+    error = state.first_error
+    yield Chunk(state.start, 0, 0.0)
+    for k in range(10**6):
+        error *= 0.9999 if k < 30 else 0.1
+        _ = yield Chunk(state.start, 1, UNIT, error=error)
+
+
+def test_a_plateau_is_taken_to_last_as_long_again():
+    steady = Entry("steady", falling(0.9, 3.0))
+    stands = Entry("stands", plateau, share=0.02)
+    assert costs(steady, stands, most=1000)[0]["stands"] < 15  # by its rate it would never end
+    spent, done = costs(
+        steady, replace(stands, again=5.0, trial=lambda state: UNIT), most=1000
+    )
+    assert done
+    assert spent["stands"] == pytest.approx(40, rel=0.2)
+
+
+def test_a_cheap_trial_comes_before_dear_steps():
+    dear = Entry("dear", falling(1.0, 20.0), needs=lambda state: 1e3 * UNIT)
+    found = Entry("found", falling(0.1, 0.1), share=0.02, optimism=1e3)
+    slow = Entry("slow", falling(1.0, 1.0))
+    assert costs(slow, dear, found, most=60)[0]["dear"] > 40
+    spent, done = costs(
+        slow, dear, replace(found, again=5.0, trial=lambda state: UNIT), most=60
+    )
+    assert done
+    assert spent["dear"] == 0
+
+
 def test_tracks_without_progress_share_what_they_cost():
     spent, done = costs(Entry("a", falling(1.0, 1.0)), Entry("b", falling(1.0, 3.0)))
     assert not done

@@ -12,10 +12,11 @@ integrals over that are of no use.  So they, and all that follows, are taken tim
 
     w = prod_c S(q_c),   q_c = (sigma_c tau_c + LEAST^2) / (tau_c^2 + LEAST^2),             (2)
 
-S rising from 0 at GONE to 1 at WHOLE.  q is the part of a corner's area that the warp leaves;
-where warps turn normals by an angle v it is 1 - v tan(b) as seen from b off the normal: facets
-of a fine mesh are whole until they are seen all but edge-on, when hardly any of them faces
-anybody.  LEAST leaves corners alone that have no area of their own, as where nodes coincide.
+S rising from 0 at GONE to 1 at WHOLE, t^3 (10 - 15 t + 6 t^2), with two continuous derivatives.
+q is the part of a corner's area that the warp leaves; where warps turn normals by an angle v it
+is 1 - v tan(b) as seen from b off the normal: facets of a fine mesh are whole until they are
+seen all but edge-on, when hardly any of them faces anybody.  LEAST leaves corners alone that
+have no area of their own, as where nodes coincide.
 """
 
 from __future__ import annotations
@@ -47,7 +48,7 @@ def visible(slave: Values, master: Values) -> Values:
     q = (sigma * tau + LEAST**2) / (tau * tau + LEAST**2)
     t = (q - GONE) / (WHOLE - GONE)
     t = np.where(t.real < 1, np.where(t.real > 0, t, 0.0), 1.0)
-    return np.where(ok, np.prod(t * t * (3 - 2 * t), axis=1), 0.0)
+    return np.where(ok, np.prod(t**3 * (10 - 15 * t + 6 * t * t), axis=1), 0.0)
 
 
 def visible_slopes(slave: Array, master: Array) -> Array:

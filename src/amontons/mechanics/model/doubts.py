@@ -16,6 +16,7 @@ from .held_facets import held_facets
 from .loading import no_load
 from .locking import volumetric_locking
 from .matching import nodal_on_non_matching
+from .overlapping import overlap_at_start
 from .rotation import large_rotation
 from .sliding import sliding_beyond_curvature, sliding_beyond_pairs
 from .unfaced import unfaced_slaves
@@ -29,6 +30,7 @@ CHECKS: tuple[Check, ...] = (
     volumetric_locking,
     large_rotation,
     nodal_on_non_matching,
+    overlap_at_start,
     like_percent,
 )
 OF_THE_START = (sliding_beyond_pairs, sliding_beyond_curvature)  # its pairs, normals

@@ -19,16 +19,17 @@ was mended takes part, though rotations open it by their squares.  (A law that l
 contacts close without overlap, u1_N >= -gap / h, turns a rocking block round a step too early
 at each impact; at the same step its times are wrong by six times as much.)
 
-Joints take back beyond the middle what they turned away from before it: with u_m of v0 and
-W_f with arms at the middle of the step, u_b of v0 and W0 with those at its beginning,
+Velocities are made to keep to the joints where a step begins (`joints`), and joints take back
+beyond the middle what they turned away from before it: with u_m of these velocities and of W_f,
+with arms at the middle of the step,
 
-    u1 = -(1 - c) u_m,    c = u_b . u_m / |u_m|^2 between 0 and 1, for joints that hang together
+    u1 = -u_m    for joints,    u1_N >= min(X^T (-u_m), 0)    for contacts that hang on them
 
-c is small, of first order in h, and 1 after a jolt, which is an impact without rebound.  The
-work of joints is -c (2 - c) / 2 u_m . W^-1 u_m: none but at jolts, as in truth, up to second
-order in h.  (u1 = 0, the law of sticking contacts, takes from a pendulum a part of its energy
-of first order: 7 % in five swings of 2 000 steps each.)  One c for all, as then -u_m c is a
-motion of the bodies, and rows that say things twice do not contradict each other.
+so that joints do no work in the step.  (u1 = 0, the law of sticking contacts, takes from a
+pendulum a part of its energy of first order: 7 % in five swings of 2 000 steps each.)  What
+joints take at the beginning of a step is all of a jolt, and else of third order in the whole.
+Contacts may take part in the motion by which joints are mirrored, or one near a joint would
+stop or throw the body; what joints decide altogether is no contact.
 
 Gravity that changes in time is that of the middle of a step.
 
@@ -47,8 +48,6 @@ from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy import sparse
-from scipy.sparse import csgraph
 
 from ...core.arrays import finite, number
 from ...core.clock import NEVER, Deadline
@@ -59,13 +58,15 @@ from ...problem.solution import FrictionSolution
 from ...solvers.asked import Asked
 from ...solvers.contract import Iterate, Solver
 from ...solvers.driver import drive_as_asked
-from .bodies import GROUND, RigidBodies
+from .bodies import RigidBodies
 from .ends import ended, freely, middle_of
+from .guides import between_planes, least_squeezed
+from .joints import Joints
 from .meeting import Meetings, meetings
 from .quick import Found, Posed, law_of, matched, pose
 from .rolling import couples, rolling_problem
 from .rows import Rows, delassus, impulses, rotations, rows_at, turned, velocities
-from .states import Motion, RigidEnergies, RigidState, RigidStep, overlap_at_start
+from .states import Motion, RigidEnergies, RigidState, RigidStep, overlap_at_start, too_long
 from .sweeping import Search, found_quickly
 
 Array = NDArray[np.float64]
@@ -85,7 +86,18 @@ class _Met(NamedTuple):
     keys: Index  # (nc, 3) slave, master, feature
     rows: Rows
     apart: Array  # (k, 3) sides of joints
+    by: Array | None  # (3 k, nc) how contacts hang on joints, where they do
     deepest: float  # largest overlap or distance of the sides of a joint
+
+    def only(self, kept: NDArray[np.bool_]) -> _Met:
+        """The same without the contacts that are not kept, (nc,)."""
+        rows = np.concatenate([kept, np.ones(len(self.rows.slave) - len(kept), dtype=bool)])
+        found: list[Any] = [a[kept] for a in self.found]
+        those: list[Any] = [a[rows] for a in self.rows]
+        by = None if self.by is None else self.by[:, kept]
+        return self._replace(
+            found=Meetings(*found), keys=self.keys[kept], rows=Rows(*those), by=by
+        )
 
 
 def evolve_rigid(
@@ -170,24 +182,15 @@ class _Stepping:
         self.bodies = masses, inertia, self.inverse
         self.no_couples = np.zeros((len(masses), 3))
         self.near = TOUCHING * system.packed.reach
-        begin = at_start(system).motion
-        R = rotations(begin.orientation)
-        first = np.array([joint.first for joint in system.joints], dtype=np.int64)
-        second = np.array([joint.second for joint in system.joints], dtype=np.int64)
-        point = np.array([joint.point for joint in system.joints], dtype=float).reshape(-1, 3)
-        self.joined = first, second
-        self.together = _hanging_together(first, second, len(masses))
-        self.anchors = (
-            np.einsum("jki,jk->ji", R[first], point - begin.position[first]),
-            np.where((second == GROUND)[:, None], point, np.einsum(
-                "jki,jk->ji", R[second], point - begin.position[second])),
-        )  # fmt: skip
+        self.normals: Array = system.packed.planes[:, :3]
+        self.joints = Joints(system, masses, self.inverse) if len(system.joints) else None
 
     # ------------------------------------------------------------------ a step
     def advance(self, state: RigidState, time: float, deadline: Deadline) -> RigidStep:
         """One step from a state to a time."""
         h, before = self.h, state.motion
         gravity = np.array(self.system.gravity_at(time - 0.5 * h))
+        before, jolt, (lost, taken) = self._kept(before)
         begin, masses = before.position, self.bodies[0]
         middle = middle_of(*before, h)
         at = self._rows(*middle)
@@ -212,7 +215,7 @@ class _Stepping:
                 self.system.restitution, at.keys, (state.keys, state.impulses),
             ))  # fmt: skip
             if len(at.apart):
-                posed.q[nc:] += self._taken_back(at.rows, nc, R, before, free[1])
+                self._mirror(at, R, before.velocity, free[1], posed.q)
             what = f"step {state.index + 1}"
             if self.system.has_moments:
                 solved = self._rolled(at, R, posed, free[1], state, what, deadline)
@@ -224,14 +227,19 @@ class _Stepping:
         motion, energies = ended(
             at.rows, r, turn, R, self.bodies, gravity, h, begin, tuple(before), free
         )
-        new = RigidState(state.index + 1, time, Motion(*motion), at.keys, r[:nc], moments)
-        return RigidStep(self.system, new, at.found, at.rows.axes[:nc], r[:nc], r[nc:],
-                         RigidEnergies(*energies), solved, self._said_of(state))  # fmt: skip
+        kinetic, potential, gain, contact, mending = energies
+        done = RigidEnergies(kinetic, potential, gain + lost, contact, mending, taken)
+        new = RigidState(
+            state.index + 1, time, Motion(*motion), at.keys, r[:nc], moments, state.lost,
+            state.fastest,
+        ).with_lost(taken, kinetic)  # fmt: skip
+        return RigidStep(self.system, new, at.found, at.rows.axes[:nc], r[:nc], r[nc:] + jolt,
+                         done, solved, self._said_of(state, new))  # fmt: skip
 
-    def _said_of(self, state: RigidState) -> tuple[ResultWarning, ...]:
-        """What the first step has to say about the state that it begins with."""
+    def _said_of(self, state: RigidState, new: RigidState) -> tuple[ResultWarning, ...]:
+        """What a step has to say: the first about the state that it begins with."""
         if state.index:
-            return ()
+            return too_long(state, new, self.h)
         x, R = state.motion.position, rotations(state.motion.orientation)
         found = meetings(self.system.packed, x, R, self.near)
         return overlap_at_start(self.system, found, self.overlap)
@@ -240,56 +248,49 @@ class _Stepping:
         """Contacts and joints of bodies at x, turned by R; apart (n,): gaps that count."""
         found = meetings(self.system.packed, x, R, self.near + apart)
         keys, axes, arms, others, deepest = rows_at(*found, x)
-        first, second = self.joined
-        if not len(first):
-            rows = Rows(found.slave, found.master, axes, arms, others)
-            return _Met(found, keys, rows, NOTHING, deepest)
-        own, other = (
-            np.einsum("jik,jk->ji", R[b], a)
-            for b, a in zip(self.joined, self.anchors, strict=True)
-        )
-        fixed = np.where((second == GROUND)[:, None], self.anchors[1], x[second] + other)
-        rows = Rows(
-            np.concatenate([found.slave, first]), np.concatenate([found.master, second]),
-            np.concatenate([axes, np.broadcast_to(np.eye(3), (len(first), 3, 3))]),
-            np.concatenate([arms, own]), np.concatenate([others, other]),
-        )  # fmt: skip
-        sides = x[first] + own - fixed
-        return _Met(found, keys, rows, sides, max(deepest, float(np.abs(sides).max())))
+        rows = Rows(found.slave, found.master, axes, arms, others)
+        if self.joints is None:
+            return _Met(found, keys, rows, NOTHING, None, deepest)
+        joints, sides = self.joints.rows(x, R)
+        hung = self.joints.hung(rows, joints, R)
+        rows_of_all: list[Any] = [np.concatenate(p) for p in zip(rows, joints, strict=True)]
+        both = Rows(*rows_of_all)
+        widest = float(np.abs(sides).max())
+        if hung is None:
+            return _Met(found, keys, both, sides, None, max(deepest, widest))
+        at = _Met(found, keys, both, sides, hung.by, 0.0).only(hung.free)
+        return at._replace(deepest=max(-at.found.gaps.min(initial=0.0), widest))
 
     def _closed(self, at: _Met, gaps: Array) -> _Met:
         """What is left of contacts that were mended, with their gaps (nc,) after that."""
-        found, nc = at.found, len(at.keys)
+        found = at.found
         apart = np.where(found.master >= 0, self.near[found.master], 0.0)
         kept = gaps <= self.near[found.slave] + apart
-        rows = np.concatenate([kept, np.ones(len(at.rows.slave) - nc, dtype=bool)])
-        left: list[Any] = [a[kept] for a in found._replace(gaps=gaps)]
-        those: list[Any] = [a[rows] for a in at.rows]
-        return _Met(Meetings(*left), at.keys[kept], Rows(*those), at.apart, 0.0)
+        return at._replace(found=found._replace(gaps=gaps), deepest=0.0).only(kept)
 
-    def _taken_back(self, rows: Rows, nc: int, R: Array, before: Motion, spin: Array) -> Array:
-        """(1 - c) u_m of the joints, (k, 3), behind nc contacts; spin (n, 3): W_f."""
-        those: list[Any] = [part[nc:] for part in rows]
-        joints = Rows(*those)
-        begin = rotations(before.orientation)
-        back = begin @ R.swapaxes(1, 2)  # from the middle to the beginning
-        arms, others = (
-            np.einsum("jik,jk->ji", back[bodies], levers)
-            for bodies, levers in (
-                (joints.slave, joints.arms), (joints.master, joints.master_arms),
-            )
-        )  # fmt: skip
-        others = np.where((joints.master == GROUND)[:, None], joints.master_arms, others)
-        begun = joints._replace(arms=arms, master_arms=others)
-        u_m, u_b = (
-            velocities(at, before.velocity, np.einsum("bij,bj->bi", turn, own))
-            for at, turn, own in ((joints, R, spin), (begun, begin, before.spin))
-        )
-        jolt, size = (
-            np.bincount(self.together, weights=(u_m * u).sum(axis=1)) for u in (u_b, u_m)
-        )
-        c = np.clip(jolt / np.where(size > 0, size, 1.0), 0.0, 1.0)
-        return (1.0 - c[self.together])[:, None] * u_m
+    def _kept(self, motion: Motion) -> tuple[Motion, Array, tuple[float, float]]:
+        """A motion that keeps to the joints, their impulses (k, 3), kinetic energy and work."""
+        if self.joints is None:
+            return motion, NOTHING, (0.0, 0.0)
+        R = rotations(motion.orientation)
+        omega = np.einsum("bij,bj->bi", R, motion.spin)
+        v, turning, jolt, work = self.joints.kept(motion.velocity, omega, motion.position, R)
+        kept = motion._replace(velocity=v, spin=np.einsum("bij,bi->bj", R, turning))
+        return kept, jolt, (self._kinetic(kept) - self._kinetic(motion), work)
+
+    def _kinetic(self, motion: Motion) -> float:
+        masses, inertia, _ = self.bodies
+        turning = np.einsum("bi,bij,bj->b", motion.spin, inertia, motion.spin)
+        return 0.5 * float((masses * (motion.velocity**2).sum(axis=1) + turning).sum())
+
+    def _mirror(self, at: _Met, R: Array, v: Array, spin: Array, q: Array) -> None:
+        """Add to free velocities q (n, 3) what joints take back; spin (n, 3): W_f."""
+        nc = len(at.keys)
+        those: list[Any] = [part[nc:] for part in at.rows]
+        u_m = velocities(Rows(*those), v, np.einsum("bij,bj->bi", R, spin))
+        q[nc:] += u_m
+        if at.by is not None:
+            q[:nc, 0] -= np.minimum(-(u_m.ravel() @ at.by), 0.0)
 
     # ------------------------------------------------------------------ problems
     def _solve(
@@ -302,7 +303,10 @@ class _Stepping:
         mu, asked = self.system.mu, self.asked
         timed = deadline is not NEVER and (deadline.work is not None or deadline.passed)
         if self.solver is None and not timed:
-            search = Search(posed, rows, R, self.bodies, contacts, mu, asked.tolerance)
+            given = R, self.bodies
+            if mu > 0 and between_planes(rows, contacts, self.normals, len(R)):
+                posed = least_squeezed(rows, *given, posed, contacts, mu, asked.tolerance)
+            search = Search(posed, rows, *given, contacts, mu, asked.tolerance)
             found, start = found_quickly(search)
             if found is not None:
                 return found
@@ -374,13 +378,3 @@ class _Stepping:
         return motion._replace(
             position=motion.position + moved, orientation=turned(motion.orientation, own)
         )
-
-
-def _hanging_together(first: Index, second: Index, bodies: int) -> Index:
-    """Numbers (k,) of the pieces that joints make of bodies; the ground joins none."""
-    both = second >= 0
-    links = sparse.coo_array(
-        (np.ones(both.sum()), (first[both], second[both])), shape=(bodies, bodies)
-    )
-    piece: Any = csgraph.connected_components(links, directed=False)[1]
-    return np.asarray(piece[first], dtype=np.int64)

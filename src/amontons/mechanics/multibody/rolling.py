@@ -11,10 +11,10 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy import sparse
 
 from ...problem.law.rolling import RollingFriction
 from ...problem.rolling import RollingProblem
+from .joints import lever_matrix
 from .rows import Rows, levers_of
 
 if TYPE_CHECKING:
@@ -41,15 +41,7 @@ def rolling_problem(
         axes = rows.axes[has]
         levers[has, side, 3:, 3:] = sign * axes @ C[body[has]]
         turning[has] += sign * np.einsum("cij,cj->ci", axes, omega[body[has]])
-    sides = np.stack([rows.slave, rows.master], axis=1)
-    contact, side = np.nonzero(sides >= 0)
-    body = sides[contact, side]
-    six = np.arange(6)
-    row = np.broadcast_to((6 * contact[:, None] + six)[:, :, None], (len(body), 6, 6))
-    column = np.broadcast_to((6 * body[:, None] + six)[:, None, :], (len(body), 6, 6))
-    G = sparse.coo_array(
-        (levers[contact, side].ravel(), (row.ravel(), column.ravel())), (6 * nc, 6 * count)
-    ).tocsr()
+    G = lever_matrix(levers, np.stack([rows.slave, rows.master], axis=1), count)
     lengths = system.mu, system.rolling, system.torsion
     law = RollingFriction(*(np.full(nc, value) for value in lengths))
     return RollingProblem(G @ G.T, np.hstack([q, turning]), law)

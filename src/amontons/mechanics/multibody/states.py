@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import NamedTuple
 
@@ -19,6 +19,7 @@ from .rows import rotations
 
 Array = NDArray[np.float64]
 Index = NDArray[np.int64]
+MUCH = 0.01  # of the largest kinetic energy, lost by joints that nothing has jolted
 
 
 class Motion(NamedTuple):
@@ -43,22 +44,39 @@ class RigidState:
     keys: Index  # (nc, 3) slave, master and feature of the last contacts
     impulses: Array  # (nc, 3) theirs, in their frames
     moments: Array = field(default_factory=lambda: np.zeros((0, 3)))  # (nc, 3) or none
+    lost: float = 0.0  # energy that joints took after the first step, an error of the steps
+    fastest: float = 0.0  # the largest kinetic energy so far
+
+    def with_lost(self, work: float, kinetic: float) -> RigidState:
+        """The same, reached by a step in which joints did this work, from that energy."""
+        lost = 0.0 if self.index <= 1 else -work  # jolts of a first step are no error
+        fastest = max(self.fastest, kinetic)
+        return replace(self, lost=self.lost + lost, fastest=fastest)
+
+    @property
+    def doubtful(self) -> bool:
+        """True where joints have taken more than `MUCH` of the energy without a jolt."""
+        return self.lost > MUCH * self.fastest
 
 
 @dataclass(frozen=True)
 class RigidEnergies:
-    """Kinetic and potential energy at the end of a step, works within it."""
+    """Kinetic and potential energy at the end of a step, works within it.
+
+    joints <= 0: all of a jolt, and else what the size of the step costs, an error of it.
+    """
 
     kinetic: float
     potential: float
     gain: float  # of both together
-    contact: float  # work of contacts and joints
+    contact: float  # work of contacts
     mending: float  # of overlaps
+    joints: float = 0.0  # work of joints
 
     @property
     def defect(self) -> float:
         """What the balance misses, of rounding."""
-        return self.gain - self.contact - self.mending
+        return self.gain - self.contact - self.mending - self.joints
 
 
 @dataclass(frozen=True, eq=False)
@@ -69,7 +87,8 @@ class RigidStep:
     in their frames, normal first; frames (nc, 3, 3) by rows; joints (k, 3): impulses on the
     first bodies, in global axes; moments (nc, 3): angular impulses where friction resists
     rolling or spinning, about the normal first, else none.  warnings: of the first step, where
-    bodies overlapped as they were given (`overlap_at_start`), else none.
+    bodies overlapped as they were given (`overlap_at_start`), and of the one in which the
+    energy that joints lose by long steps gets too much (`too_long`), else none.
     """
 
     system: RigidBodies
@@ -146,6 +165,21 @@ def overlap_at_start(
         "step, so that bodies do not begin where they were put; give positions without overlap"
     )
     return (ResultWarning("overlap-at-start", text),)
+
+
+def too_long(before: RigidState, after: RigidState, step: float) -> tuple[ResultWarning, ...]:
+    """A warning in the step in which what joints have lost gets more than `MUCH`."""
+    if before.doubtful or not after.doubtful:
+        return ()
+    turns = step * np.linalg.norm(after.motion.spin, axis=1)
+    fast = int(np.argmax(turns))
+    text = (
+        f"joints have taken {100 * after.lost / after.fastest:.2g} % of the largest kinetic "
+        f"energy until t = {after.time:.4g} without a jolt, by the size of the steps "
+        f"(body {fast} turns by {turns[fast]:.2g} rad in this one); the loss falls with its "
+        f"third power: take steps of {0.5 * step:.3g} or less"
+    )
+    return (ResultWarning("joints-lose-energy", text),)
 
 
 def _named(system: RigidBodies, number: int) -> str:

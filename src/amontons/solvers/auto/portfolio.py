@@ -29,7 +29,7 @@ from numpy.typing import NDArray
 
 from ...problem.friction import FrictionProblem
 from ..contract import Iterate, Iterates, Target
-from .race import Entry, Race
+from .race import CALL, FIRST_CHUNKS, SHORTEST, Entry, Race
 from .stages import (
     SEMISMOOTH_CONTACTS,
     Stage,
@@ -39,6 +39,7 @@ from .stages import (
 )
 from .state import DENSE, State
 from .tracks import (
+    LEAST,
     anderson,
     inexact_newton,
     interior_point,
@@ -87,6 +88,11 @@ def _steps(count: float) -> Callable[[State], float]:
     return lambda state: count * state.step_cost
 
 
+def _momentum_chunks(state: State) -> float:
+    """Nanoseconds of a chunk more of sweeps with momentum than their rate needs."""
+    return (FIRST_CHUNKS + 1) * (max(LEAST * state.momentum_cost, SHORTEST) + CALL)
+
+
 def _relaxation_steps(state: State) -> float:
     return 20 * state.relaxation_cost
 
@@ -122,11 +128,13 @@ def restarts(state: State, stages: tuple[Stage, ...] = RESTARTS) -> Iterator[Ite
 
 TRACKS = (
     Entry("Anderson Gauss-Seidel", anderson, 0.02, 1.0),
-    Entry("momentum Gauss-Seidel", momentum, 0.1, 3.0, near=1.5),
+    Entry("momentum Gauss-Seidel", momentum, 0.1, 3.0, near=1.5, again=5.0,
+          trial=_momentum_chunks),
     Entry("Gauss-Seidel, relaxation 1.6", partial(relaxed, 1.6), 0.02, 3.0),
     Entry("Gauss-Seidel, relaxation 0.9", partial(relaxed, 0.9), 0.02, 3.0),
     Entry("interior point", interior_point, 0.05, 1.0, _relaxation_steps, _has_cone, stacked=5),
-    Entry("smoothing Newton", smoothing_newton, 0.15, 1.0, _steps(30), _has_cone),
+    Entry("smoothing Newton", smoothing_newton, 0.15, 1.0, _steps(30), _has_cone, again=3.0,
+          trial=_steps(30)),
     Entry("Anderson Gauss-Seidel, deep", polish, 0.1, 1.0, _deep_sweeps, _can_end, True),
     Entry("inexact Newton", inexact_newton, 0.3, 0.3, _at_joints, _has_joints),
     Entry("semismooth Newton", semismooth_newton, 0.1, 1.0, _dense_steps, _has_steps),

@@ -18,6 +18,9 @@ believed less: its rest counts C / (GRACE F) times.  Besides
     near        where the best error of all is near the goal, momentum is taken to need, until
                 it has cost that, a multiple of the whole way at the mean rate at which that
                 error was come by: sweeps of another kind cost less than Newton's from afar
+    as long     momentum and smoothing Newton are taken to need at most some multiple of what
+                they have cost, or of what a trial costs: of a plateau nothing is known but how
+                long it has lasted, and where a trial is cheap it is made before dear ones
     first       the track at the top of the table has a few chunks before all others, and more
                 while it promises the goal for less than to let them in costs
     stacks      where most contacts share faces of rigid bodies, reactions are many more than
@@ -126,6 +129,8 @@ class Entry:
     when: Callable[[State], bool] = always
     last: bool = False
     near: float = 0.0
+    again: float = math.inf
+    trial: Callable[[State], float] | None = None
     stacked: int = 0
 
 
@@ -184,6 +189,8 @@ class Track:
             promise *= self.cost / (GRACE * self.foreseen)
         if self.cost < entry.near * way:
             promise = min(promise, entry.near * way - self.cost)
+        if entry.trial is not None:
+            promise = min(promise, entry.again * max(self.cost, entry.trial(self.state)))
         unknown = self.cost < entry.share * total
         return min(promise, entry.optimism * total) if unknown else promise
 

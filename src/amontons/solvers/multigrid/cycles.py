@@ -10,8 +10,9 @@ One cycle, from v on the finest level:
    contacts solve again, and states, reactions and residual are of this v.
 3. coarse correction: one linear V(1,1) cycle, with two on the second coarse level, on levels
    that see these states, a Galerkin tangent whose test and trial spaces are truncated to the
-   directions in which the contacts can move (`truncation`).  It is renewed when a state changes
-   or the error has fallen far.  Slip ends where it would turn round (`ContactNodes.limit`).
+   directions in which the contacts can move (`truncation`).  It is renewed when more than FEW
+   states change or the error has fallen far.  Slip ends where it would turn round
+   (`ContactNodes.limit`).
 4. smooth in reverse order.
 
 Residuals say little of what moves slowly in soft parts between stiff ones: after LATE cycles
@@ -64,12 +65,14 @@ from ..least_residual import LeastResidual
 from .levels import ContactLevels
 from .nodes import ContactNodes
 from .tangent import Tangent
+from .visits import CLOSED
 
 Array = NDArray[np.float64]
 MANY = 0.1  # share of contacts that change their state above which mixing begins anew
 GROWTH = 1e3  # of the error over the best one that counts as divergence
 LATE = 30  # cycles after which steps are mixed: residuals hide slow errors in soft parts
 LONG = 24  # steps to mix then
+FEW = 0.01  # share of the closed contacts up to which changed states leave the tangent as it is
 GRID_DEPTH = 2  # past cycles to mix at most where M is not stored
 SLOW = 0.8  # fall of the error in a cycle above which, while states change, steps are limited
 CLOSE = 0.99  # share of the error that should do at which an iterate is handed out
@@ -89,7 +92,7 @@ class ContactMultigrid:
     depth: int = 8
     nested: bool = True
     coarse_tolerance: float = 1e-2
-    update_ratio: float = 0.003
+    update_ratio: float = 0.01
     contact_sweeps: int = 1  # over the contact nodes after each sweep in the bulk
     patience: int = 30  # cycles without halving the error before it gives up
     report: int = 10  # cycles between iterates that are not yet good enough
@@ -230,7 +233,7 @@ class _Run:
             careful = unsettled and error > SLOW * last
             last = error
             fallen = error < self.options.update_ratio * at_update
-            if self.changed() or careful or self.frozen or fallen:
+            if not self.few_changed() or careful or self.frozen or fallen:
                 self.renew(careful)
                 at_update = error
             (self.correct_carefully if careful else self.correct)(x)
@@ -244,6 +247,11 @@ class _Run:
     def changed(self) -> int:
         """Number of contacts in another state than in the tangent."""
         return int(np.count_nonzero(self.contacts.state != self.states))
+
+    def few_changed(self) -> bool:
+        """True where hardly any contact has changed its state since the tangent was renewed."""
+        closed = int(np.count_nonzero(self.contacts.state >= CLOSED))
+        return self.changed() <= FEW * closed
 
     def smooth(self, x: Array, backward: bool) -> None:
         """One sweep in the bulk."""

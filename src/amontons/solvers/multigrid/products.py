@@ -185,20 +185,46 @@ def _spread(p_ptr, weights, node, first, place, chosen, blocks, out, marks, foun
     return count
 
 
+@njit(cache=True, error_model="numpy", inline="always")
+def _nine(B):
+    """Row after row."""
+    return B[0, 0], B[0, 1], B[0, 2], B[1, 0], B[1, 1], B[1, 2], B[2, 0], B[2, 1], B[2, 2]
+
+
+@njit(cache=True, error_model="numpy", inline="always")
+def _transposed(B):
+    """Column after column."""
+    return B[0, 0], B[1, 0], B[2, 0], B[0, 1], B[1, 1], B[2, 1], B[0, 2], B[1, 2], B[2, 2]
+
+
+@njit(cache=True, error_model="numpy", inline="always")
+def _add_product(a, b, out, t):
+    """out[t] += a b, each given as nine numbers, for the same reason as in `_spread`."""
+    a0, a1, a2, a3, a4, a5, a6, a7, a8 = a
+    b0, b1, b2, b3, b4, b5, b6, b7, b8 = b
+    out[t, 0, 0] += a0 * b0 + a1 * b3 + a2 * b6
+    out[t, 0, 1] += a0 * b1 + a1 * b4 + a2 * b7
+    out[t, 0, 2] += a0 * b2 + a1 * b5 + a2 * b8
+    out[t, 1, 0] += a3 * b0 + a4 * b3 + a5 * b6
+    out[t, 1, 1] += a3 * b1 + a4 * b4 + a5 * b7
+    out[t, 1, 2] += a3 * b2 + a4 * b5 + a5 * b8
+    out[t, 2, 0] += a6 * b0 + a7 * b3 + a8 * b6
+    out[t, 2, 1] += a6 * b1 + a7 * b4 + a8 * b7
+    out[t, 2, 2] += a6 * b2 + a7 * b5 + a8 * b8
+
+
 @njit(cache=True, error_model="numpy")
 def _half_blocks(p_ptr, blocks, node, first, place, chosen, change, out, marks, found):  # noqa: PLR0913
     """The same with blocks of P from the right."""
     count = 0
     for c in range(len(chosen)):
         e = uint64(chosen[c])
-        i, at, B = node[e], first[e], change[e]
-        for b in range(p_ptr[i], p_ptr[i + 1]):
-            R, t = blocks[b], uint64(place[at])
-            at += 1
+        i, at, B = uint64(node[e]), uint64(first[e]), _nine(change[e])
+        for b in range(uint64(p_ptr[i]), uint64(p_ptr[i + uint64(1)])):
+            t = uint64(place[at])
+            at += uint64(1)
             count = _noted(t, marks, found, count)
-            for m in range(3):
-                for n in range(3):
-                    out[t, m, n] += B[m, 0] * R[0, n] + B[m, 1] * R[1, n] + B[m, 2] * R[2, n]
+            _add_product(B, _nine(blocks[b]), out, t)
     return count
 
 
@@ -208,12 +234,10 @@ def _rest_blocks(p_ptr, blocks, node, first, place, chosen, half, out, marks, fo
     count = 0
     for c in range(len(chosen)):
         e = uint64(chosen[c])
-        i, at, B = node[e], first[e], half[e]
-        for b in range(p_ptr[i], p_ptr[i + 1]):
-            Q, t = blocks[b], uint64(place[at])
-            at += 1
+        i, at, B = uint64(node[e]), uint64(first[e]), _nine(half[e])
+        for b in range(uint64(p_ptr[i]), uint64(p_ptr[i + uint64(1)])):
+            t = uint64(place[at])
+            at += uint64(1)
             count = _noted(t, marks, found, count)
-            for m in range(3):
-                for n in range(3):
-                    out[t, m, n] += Q[0, m] * B[0, n] + Q[1, m] * B[1, n] + Q[2, m] * B[2, n]
+            _add_product(_transposed(blocks[b]), B, out, t)
     return count

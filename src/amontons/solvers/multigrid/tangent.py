@@ -18,7 +18,7 @@ from .products import Sum
 from .truncation import Near, Truncation
 
 Array = NDArray[np.float64]
-TURNED = 0.1  # change of V and W, and of L by its size, up to which contacts slide as before
+TURNED = 0.3  # change of V and W, and of L by its size, up to which contacts slide as before
 
 
 class Tangent:

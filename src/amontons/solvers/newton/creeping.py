@@ -14,7 +14,9 @@ is the pseudo-transient continuation of [KK], and the proximal point method of `
 c begins with FIRMNESS, the bodies themselves having 1.  It falls with every solution, and with
 |F|, but not where |F| rises; and is multiplied by STIFFER where Newton's method does not solve
 (1): on the way down (1) has no solution either where c is less than what the tangent lacks.
-Below WEAK Newton's method goes on without.
+Below WEAK Newton's method goes on without.  It begins where Newton's steps at the whole load
+step lead nowhere, far from the last equilibrium, where |F| is large: from one just past it the
+first steps are as short as the way off it is flat.
 
 [KK] C. T. Kelley, D. E. Keyes, "Convergence analysis of pseudo-transient continuation", SIAM J.
 Numer. Anal. 35 (1998).
@@ -41,7 +43,7 @@ FIRMNESS, WEAK, STIFFEST = 1.0, 0.01, 100.0  # c: the first, where it is none, t
 STIFFER, SOFTER = 4.0, 0.7
 RISES = 1.1  # |F| over the last one above which c stays: bodies move ever faster
 LEAST = 0.1  # of c in the next step, where |F| falls by more
-INNER, INNER_STEPS = 0.3, 8  # |F| of (1) that will do, over the first one; Newton steps
+INNER, INNER_STEPS = 0.5, 8  # |F| of (1) that will do, over the first one; Newton steps
 DAMPED = 2  # of them cut to less than half, after which c is too small
 MOST = 60  # Newton steps of all
 
@@ -86,6 +88,7 @@ def _slowed(
             w = w + length * step
             size = np.linalg.norm(states.residual(w))
         except (Failed, InvertedCells, SingularOperator):
+            yield v  # a step, too
             return None, count
         yield states.v(w)
         damped += length < 0.5

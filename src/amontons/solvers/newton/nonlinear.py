@@ -4,9 +4,11 @@ The problem is F(v) = 0, piecewise smooth, with a linearisation at every admissi
 `model.large_deformation`.  It is tried at full load at once; where that fails the load grows in
 steps from a state that is known, each begun by one of `predictors`: where Newton's method fails
 from one the next is tried.  `step_lengths` says how far steps go.  Where two bodies slide and a
-state under load is known, a Newton step that passes the test in no part ends the attempt, and
-the load step is cut; a short one ends with bodies that creep on (`creeping`).  Where these do
-not come to rest load steps begin anew, with patience for steps that do not pass.
+state under load is known, a Newton step that passes the test in no part ends the attempt, but
+that from the last predictor: there bodies creep on (`creeping`), whatever the load step, as cut
+ones lead to the same state by more Newton steps.  Where bodies do not come to rest the load
+step is cut, and where they do not in a SHORT one load steps begin anew, with patience for
+steps that do not pass.
 """
 
 from __future__ import annotations
@@ -33,7 +35,7 @@ from .step_lengths import Failed, by_natural_test, by_residual
 Array = NDArray[np.float64]
 LOOSE = 1e-5  # error, unit-free, at which a load step is good enough to go on
 REPEATED = 1e-12  # relative difference of |F| below which steps go round in circles
-SHORT = 1 / 16  # of the load: steps up to which bodies creep, others are cut first
+SHORT = 1 / 16  # of the load: steps that are not cut where bodies do not come to rest
 CREPT = "over a jump, to where bodies creep"
 JUMP = "; if the body jumps there, crossing=PathCrossing() of this solver follows it"
 EASY = 8  # Newton steps up to which the next load step may be longer
@@ -159,9 +161,11 @@ class NonlinearNewton:
                     f"no equilibrium found beyond {share:.4g} of the load: {reason}{hint}"
                 )
             goal = min(1.0, share + step)
-            creeps = creeping_helps and loaded and step <= SHORT
-            shown.brief = creeping_helps and loaded and step > SHORT
-            for predict in predictors(problem):
+            arrived, before, note = False, 0, shown.note
+            ways = predictors(problem)
+            shown.brief = creeping_helps and loaded
+            for predict in ways:
+                creeps = shown.brief and predict is ways[-1]
                 try:
                     first = predict(problem, share, goal, v, target, linear)
                     if goal == 1.0:
@@ -173,14 +177,18 @@ class NonlinearNewton:
                     found = self._newton(then, states, target, linear, shown, creeps)
                     before = shown.waiting
                     v = shown.reached(found, then, states.v(states.start))
+                    arrived = True
                     break
                 except (Failed, InvertedCells) as failure:
                     reason = str(failure)
+                    shown.note = note
+            if arrived:
+                share = goal
+                step *= 2 if shown.waiting - before <= EASY else 1
+            elif shown.brief and step <= SHORT:
+                step = 0.0
             else:
-                step = 0.0 if creeps else (goal - share) / (4 if goal - share == 1.0 else 2)
-                continue
-            share = goal
-            step *= 2 if shown.waiting - before <= EASY else 1
+                step = (goal - share) / (4 if goal - share == 1.0 else 2)
 
     def _newton(
         self, problem: NonlinearProblem, states: States, target: Target, linear: LinearSteps,
@@ -206,18 +214,20 @@ class NonlinearNewton:
                 )
             except SingularOperator as reason:
                 raise Failed(str(reason)) from reason
+            shown.waiting += 1
             step, goes = states.whole(w, moved), True
             if problem.shortest > 0:
                 length, goes = by_natural_test(problem, states, w, step, factor, self.halvings)
             else:
                 length = by_residual(states, w, step, sizes, self.halvings)
-            if not goes and shown.brief:
+            if not goes and shown.brief and not creeps:
                 raise Failed("no part of a Newton step leads nearer")
             if goes or not creeps:
                 w = w + length * step
                 yield states.v(w), problem.reactions(states.v(w)), size
                 continue
             for way in creeping(problem, v, self.halvings, linear, target):
+                shown.waiting += 1
                 yield way, problem.reactions(way), np.inf
                 w = problem.states(way).start
             creeps, shown.note = False, CREPT
@@ -235,10 +245,10 @@ class NonlinearNewton:
 
 @dataclass
 class _Shown:
-    """Lets pass what is better than all before, and counts what it keeps back."""
+    """Lets pass what is better than all before."""
 
     size: float = np.inf
-    waiting: int = 0
+    waiting: int = 0  # Newton steps since then, those that led nowhere, too
     brief: bool = False  # steps that the test refuses end an attempt: another way is next
     note: str = ""  # what happened on the way
 
@@ -247,7 +257,6 @@ class _Shown:
     ) -> Iterator[Iterate]:
         """The iterates whose |F| is the least so far."""
         for v, r, size in steps:
-            self.waiting += 1
             if size < self.size:
                 yield Iterate(r, v, self.waiting, self.waiting, told or self.note)
                 self.size, self.waiting = size, 0
@@ -258,5 +267,4 @@ class _Shown:
         """The first state from v on that is good enough for a load between."""
         while problem.error(problem.reactions(v), v) > LOOSE:
             v = next(steps)[0]
-            self.waiting += 1
         return v
