@@ -31,7 +31,7 @@ from .sliding import SlidingState, factor
 
 Array = NDArray[np.float64]
 MODES = 24  # of p = 0 that are kept
-FORCES = 400  # sliding contacts up to which G is formed: a solve of the whole for each
+FORCES = 100  # sliding contacts up to which G is formed: a solve of its size at every step
 TRUSTED = 0.25  # part of the largest l: half the frequency, as in component mode synthesis
 INDEPENDENT = 1e-6  # part of a mode, squared, that those before do not have
 EPSILON = float(np.finfo(float).eps)
