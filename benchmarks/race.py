@@ -4,7 +4,8 @@
     python benchmarks/race.py --unseen [...]
 
 The problems are those of `classes.py`; --unseen takes those on which no constant was chosen but
-`Entry.again`, that one at other seeds.  Every track of the table in `solvers/auto/portfolio.py`
+those of plateaus, `Entry.again` and `Entry.trial` in the table of `solvers/auto/portfolio.py`,
+and these at other seeds.  Every track of the table in `solvers/auto/portfolio.py`
 runs alone on each of them for at most `cap` CPU seconds, those of Newton's kind from 60
 accelerated sweeps, as in the race; the *oracle* is the fastest of them.  Auto is a whole solve,
 judge and bookkeeping included, for at most `cap` or PATIENCE times the oracle; like a track it

@@ -8,6 +8,7 @@ import pytest
 
 import amontons as am
 from amontons.mechanics.ready.gallery import random_delassus
+from amontons.solvers.auto import race
 from amontons.solvers.auto.portfolio import MOST_TURNS, RESTARTS, TRACKS, Portfolio, restarts
 from amontons.solvers.auto.race import LOST_CHUNKS, Chunk, Entry, Race, Track, whole_way
 from amontons.solvers.auto.state import FEW, State, visits
@@ -193,6 +194,17 @@ def test_a_first_track_that_is_nearly_there_goes_on_alone():
     spent, done = costs(Entry("first", falling(0.1, 0.01)), Entry("other", falling(0.01, 0.01)))
     assert done
     assert list(spent) == ["first"]
+
+
+def test_a_first_track_that_ends_on_stacks_leaves_no_other_in_its_place(monkeypatch):
+    monkeypatch.setattr(race, "chunks_alone", lambda problem, tolerance: 1)
+    monkeypatch.setattr(State, "is_stacked", True)
+    spent, done = costs(Entry("first", falling(0.1, 0.01, count=1)),
+                        Entry("dear", falling(0.99, 1e3), stacked=50),
+                        Entry("other", falling(0.1, 1.0), share=0.1), most=9000)  # fmt: skip
+    assert done
+    assert set(spent) == {"dear", "other"}
+    assert spent["dear"] == pytest.approx(1e3, rel=0.01)  # the one chunk before others
 
 
 def test_broken_promises_count_less():

@@ -117,7 +117,9 @@ class Entry:
     rate, until it has cost them; None for sweeps.  near: what it is taken to need near the end,
     in whole ways at the mean rate of the best; 0: nothing is known.  last: it runs where no
     other promises the goal for that, and has no more than its share while another promises it
-    at all.  stacked: Newton steps that it usually takes on stacks of rigid blocks, where it
+    at all.  again, trial: it is taken to need at most `again` times what it has cost, or what
+    trial(state), nanoseconds, says that a trial costs where that is more; no bound where trial
+    is None.  stacked: Newton steps that it usually takes on stacks of rigid blocks, where it
     comes second; 0: it comes with the others.
     """
 
@@ -296,32 +298,31 @@ class Race:
         A tighter goal that is sent counts from there on.
         """
         tolerance, alone = self.state.target.tolerance, FIRST_CHUNKS
-        while self.tracks and self._is_first():
-            yield from self._go_on(self.tracks[0])
+        leader = self.tracks[0]
+        while leader in self.tracks and self._is_first(leader):
+            yield from self._go_on(leader)
             if self.chunks == 1:
                 alone = chunks_alone(self.state.problem, tolerance)
                 if alone == 1:
-                    yield from self._on_stacks()
+                    yield from self._on_stacks(leader)
         if alone > 1:
-            yield from self._on_stacks()
+            yield from self._on_stacks(leader)
         self.enter()
         while self.tracks and not self._is_lost():
             yield from self._go_on(self._next())
         if self.done.iterations:
             yield self._shown()
 
-    def _is_first(self) -> bool:
+    def _is_first(self, first: Track) -> bool:
         """True while the first track has its chunks, or promises the goal before others run."""
-        first = self.tracks[0]
         entry = ENTRY + ENTRY_BLOCK * len(self.state.problem.blocks.indices)
         return len(first.errors) <= FIRST_CHUNKS or first.rest(self.total) < entry
 
-    def _on_stacks(self) -> Iterates:
+    def _on_stacks(self, first: Track) -> Iterates:
         """What is quick on stacks beside the first track, until it has had what it needs."""
         state = self.state
         if not (self.tracks and state.is_stacked):
             return
-        first = self.tracks[0]
         for entry in [e for e in self.table if e.stacked and e.when(state)]:
             needed = entry.stacked * (state.relaxation_cost + CALL)
             track = Track(entry, state)

@@ -28,6 +28,7 @@ from ...problem.law.law import MU, TIED
 from ..sweeps.on_bodies import GROUND, driven_inplace, felt_inplace
 from .block_lu import Symbolic, analyse_doubled, factorise_inplace, found, solve_inplace
 from .cone_steps import (
+    LEFT,
     advance_inplace,
     changes_inplace,
     gap_left,
@@ -39,7 +40,6 @@ from .cone_steps import (
 from .interior_point import ENOUGH, SHORT, STALLED
 
 Array = NDArray[np.float64]
-BOUNDARY = 0.99  # part of the way to the boundary of the cones that a step goes
 SOFT = 1e-12  # of bonds, relative: E of a row that has none
 
 
@@ -252,7 +252,7 @@ def relax_on_bodies_inplace(  # noqa: PLR0913
             length = min(room(x, dx, able), room(y, dy, able))
             if not length > 0.0:
                 return count
-            length = min(1.0, length * (1.0 if phase == 0 else BOUNDARY))
+            length = min(1.0, length * (1.0 if phase == 0 else 1.0 - LEFT))
             if phase == 0:
                 sigma = gap_left(x, y, dx, dy, able, length, total) ** 3
         short = short + 1 if length < SHORT else 0

@@ -13,7 +13,7 @@ a direction has
 
     s = D^-1 (e - t) where D^-1 is below X, s = B^T X B t where e - t would cancel,
 
-and dr_i = E_i^-1 (f_i - L_i v_g), refined once.
+and dr_i = E_i^-1 (f_i - L_i v_g).  Correctors are refined once, predictors are not.
 """
 
 from __future__ import annotations
