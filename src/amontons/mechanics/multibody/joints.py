@@ -15,7 +15,8 @@ can slide, as a turntable on a floor with a hinge about the normal: it takes par
 friction, though equilibrium of rigid bodies does not say which part of the load it carries and
 which the joints; `undetermined` names it.
 
-W_JJ^+ is (W_JJ + e)^-1 with a small e for each row, a part of its own diagonal.
+W_JJ^+ is (W_JJ + e)^-1 with a small e: rows that say something twice get equal shares.  It
+is a part of the mean diagonal of those joints that are linked by bodies, of no others.
 """
 
 from __future__ import annotations
@@ -25,6 +26,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 from scipy import sparse
+from scipy.sparse.csgraph import connected_components
 from scipy.sparse.linalg import SuperLU, splu
 
 from .bodies import GROUND, RigidBodies
@@ -32,7 +34,7 @@ from .rows import Rows, impulses, levers_of, rotations, velocities
 
 Array = NDArray[np.float64]
 Index = NDArray[np.int64]
-SMALL = 1e-12  # e over the diagonal of W_JJ
+SMALL = 1e-12  # e over the mean of the diagonal of W_JJ
 DECIDED = 1e-9  # of |g|^2: what is left of a contact that joints decide; SMALL is in it
 AT_ONCE = 64  # contacts whose X are formed together, dense
 
@@ -84,6 +86,10 @@ class Joints:
         self.jointed = np.zeros(len(bodies) + 1, dtype=bool)  # the last one is the ground
         self.jointed[self.first] = True
         self.jointed[self.second[self.second != GROUND]] = True
+        pairs = self.first, np.where(self.second == GROUND, self.first, self.second)
+        graph = sparse.coo_array((np.ones(len(joints)), pairs), (len(bodies), len(bodies)))
+        groups = connected_components(graph, directed=False)[1][self.first]
+        self.linked = np.unique(groups, return_inverse=True)[1]  # its group, of each joint
         x = np.array([body.position for body in bodies])
         R = rotations(np.array([body.orientation for body in bodies]))
         point = np.array([joint.point for joint in joints], dtype=float).reshape(-1, 3)
@@ -110,7 +116,9 @@ class Joints:
         """G_J, sparse, and W_JJ^+ as factors."""
         G = lever_matrix(*self._levers(rows, R), len(self.masses))
         W = G @ G.T
-        return G, splu((W + SMALL * sparse.diags_array(W.diagonal())).tocsc())
+        own = W.diagonal().reshape(-1, 3).mean(axis=1)
+        e = SMALL * np.bincount(self.linked, own) / np.bincount(self.linked)
+        return G, splu((W + sparse.diags_array(np.repeat(e[self.linked], 3))).tocsc())
 
     def kept(
         self, velocity: Array, omega: Array, x: Array, R: Array
