@@ -1,11 +1,15 @@
 """Joints of rigid bodies: what they take, contacts that hang on them, guides without play."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from scipy import integrate
 
 import amontons as am
 from amontons.mechanics.multibody import GROUND, Joint, RigidBodies, RigidBody, cuboid
+from amontons.mechanics.multibody.guides import between_planes
+from amontons.mechanics.multibody.rows import Rows
 
 FLOOR = am.Plane((0, 0, 1))
 G = 9.81
@@ -32,7 +36,7 @@ def test_a_block_turns_about_a_corner_that_stands_on_the_floor(beside):
     block = RigidBody(cuboid((1, 0.4, 1)), position=at, spin=spin,
                       velocity=np.cross(spin, at - hinge))  # fmt: skip
     joints = [Joint(0, GROUND, hinge + [0, y, 0]) for y in (-0.2, 0.2)]
-    steps = run(RigidBodies([block], [FLOOR], joints=joints), 1e-3, 0.3)
+    steps = run(RigidBodies([block], [FLOOR], joints=joints), 2e-3, 0.2)
     arm = at - hinge
     about = block.inertia[1, 1] + block.mass * (arm @ arm)
     begin, length = np.arctan2(arm[2], arm[0]), np.hypot(*arm[[0, 2]])
@@ -40,9 +44,9 @@ def test_a_block_turns_about_a_corner_that_stands_on_the_floor(beside):
     def fall(_, y):
         return [y[1], -block.mass * G * length * np.cos(y[0]) / about]
 
-    swung = integrate.solve_ivp(fall, (0, 0.3), [begin, 2.0], rtol=1e-10, atol=1e-10)
+    swung = integrate.solve_ivp(fall, (0, 0.2), [begin, 2.0], rtol=1e-10, atol=1e-10)
     end = steps[-1].position[0] - hinge
-    assert np.arctan2(end[2], end[0]) == pytest.approx(swung.y[0, -1], abs=2e-6)
+    assert np.arctan2(end[2], end[0]) == pytest.approx(swung.y[0, -1], abs=1e-5)
     assert np.ptp(energy(steps)) < 1e-8 * block.mass * G
 
 
@@ -51,11 +55,11 @@ def test_a_block_falls_back_onto_the_edge_beyond_its_hinge():
     block = RigidBody(cuboid((1, 0.4, 1)), position=(0.5, 0, 0.5), spin=(0, -1.0, 0),
                       velocity=np.cross((0, -1.0, 0), (0.5, 0, 0.5)))  # fmt: skip
     joints = [Joint(0, GROUND, (0, y, 0)) for y in (-0.2, 0.2)]
-    end = run(RigidBodies([block], [FLOOR], joints=joints), 1e-3, 0.4)[-1]
+    end = run(RigidBodies([block], [FLOOR], joints=joints), 2e-3, 0.4)[-1]
     np.testing.assert_allclose(end.position[0], (0.5, 0, 0.5), atol=2e-5)
     assert np.abs(end.state.motion.spin).max() < 1e-6
     carried = end.r[:, 0].sum() + end.joints[:, 2].sum()
-    assert carried == pytest.approx(block.mass * G * 1e-3, rel=1e-5)
+    assert carried == pytest.approx(block.mass * G * 2e-3, rel=1e-5)
 
 
 def bar(a, b, turning, velocities):
@@ -92,8 +96,8 @@ def light_crank(phi=-0.5, speed=20.0, r=0.1, rod=0.3):
 def test_what_joints_lose_by_long_steps_is_of_third_order_and_told():
     """Energy is kept in truth; over the dead centre the crank turns by 0.1 rad in a step."""
     lost = []
-    for step in (1e-3, 5e-4, 2.5e-4):
-        steps = run(light_crank(), step, 0.05, tolerance=1e-9)
+    for step in (1e-3, 5e-4):
+        steps = run(light_crank(), step, 0.032, tolerance=1e-9)
         E = energy(steps)
         lost.append(1 - E[-1] / E[0])
         works = sum(s.energies.joints + s.energies.contact for s in steps)
@@ -102,24 +106,29 @@ def test_what_joints_lose_by_long_steps_is_of_third_order_and_told():
         names = [w.name for s in steps for w in s.warnings]
         assert names == (["joints-lose-energy"] if step == 1e-3 else [])
     assert lost[0] > 0.01
-    assert lost[0] > 5 * lost[1] > 20 * lost[2]  # contacts of the guide are of first order
+    assert lost[0] > 5 * lost[1]  # contacts of the guide are of first order
 
 
-@pytest.mark.parametrize("step", [1e-3, 2.5e-4])
-def test_a_guide_without_play_does_not_squeeze(step):
+@pytest.mark.parametrize(
+    ("step", "options", "ground"),
+    [(1e-3, {}, {}), (2.5e-4, {}, {}), (2e-3, {"solver": am.Auto()}, {}),
+     (2e-3, {}, {"torsion": 1e-6})],
+)  # fmt: skip
+def test_a_guide_without_play_does_not_squeeze(step, options, ground):
     """Deceleration mu g: more would be an answer too, with any squeeze between both planes."""
     planes = [am.Plane((0, 0, 1), (0, 0, -0.15)), am.Plane((0, 0, -1), (0, 0, 0.15))]
     block = RigidBody(cuboid((0.3, 0.3, 0.3)), 300, (0, 0, 0), velocity=(2, 0, 0))
-    steps = run(RigidBodies([block], planes, mu=0.3), step, 0.1, tolerance=1e-9)
+    system = RigidBodies([block], planes, mu=0.3, **ground)
+    steps = run(system, step, 0.025, tolerance=1e-9, **options)
     speeds = [s.state.motion.velocity[0, 0] for s in steps]
     np.testing.assert_allclose(
-        speeds, [2 - 0.3 * G * s.time for s in steps], atol=1e-3 * 0.3 * G * 0.1
+        speeds, [2 - 0.3 * G * s.time for s in steps], atol=1e-3 * 0.3 * G * 0.025
     )
 
 
 def test_a_chain_falls_as_lagrange_says():
-    """Six links let go level, in m and kg or in mm and t; angles from an ODE."""
-    n, length, step, until = 6, 0.1, 2e-3, 0.2
+    """Four links let go level, in m and kg or in mm and t; angles from an ODE."""
+    n, length, step, until = 4, 0.1, 2e-3, 0.15
     C = length * (np.tril(np.ones((n, n)), -1) + 0.5 * np.eye(n))  # centres by angles
 
     def chain(unit, density):
@@ -146,3 +155,107 @@ def test_a_chain_falls_as_lagrange_says():
     np.testing.assert_allclose(end.position[:, 2], expected, atol=2e-5 * length * n)
     other = run(chain(1e3, 1e-9), step, until, tolerance=1e-9)[-1]
     np.testing.assert_allclose(other.position / 1e3, end.position, atol=1e-10)
+
+
+def hanging_chain():
+    """Five links on the ground."""
+    bars = [RigidBody(cuboid((0.01, 0.01, 0.1)), position=(0, 0, -(k + 0.5) * 0.1))
+            for k in range(5)]  # fmt: skip
+    joints = [Joint(k, k - 1, (0, y, -0.1 * k)) for k in range(5) for y in (-0.02, 0.02)]
+    return RigidBodies(bars, joints=joints, apart=[(i, j) for i in range(5) for j in range(i)])
+
+
+def portal():
+    """A beam hinged to two posts."""
+    bodies = [RigidBody(cuboid((0.1, 0.1, 1)), position=(x, 0, 0.5)) for x in (0, 2)]
+    bodies.append(RigidBody(cuboid((2.1, 0.1, 0.1)), position=(1, 0, 1.05)))
+    joints = [Joint(2, post, (2 * post, y, 1)) for post in (0, 1) for y in (-0.05, 0.05)]
+    return RigidBodies(bodies, [FLOOR], joints=joints, apart=[(0, 2), (1, 2)])
+
+
+def lying_chain(n):
+    """Links on the floor."""
+    bars = [RigidBody(cuboid((0.09, 0.03, 0.03)), position=((k + 0.5) * 0.1, 0, 0.015))
+            for k in range(n)]  # fmt: skip
+    joints = [Joint(k, k - 1, (0.1 * k, y, 0.015)) for k in range(1, n) for y in (-0.01, 0.01)]
+    return RigidBodies(bars, [FLOOR], joints=joints, apart=[(k, k + 1) for k in range(n - 1)])
+
+
+@pytest.mark.parametrize(
+    ("system", "until"), [(hanging_chain(), 0.03), (portal(), 0.01), (lying_chain(30), 3e-3)]
+)
+def test_what_stands_still_loses_no_energy(system, until):
+    """What is lost there is an error of solves; any part of nothing was much."""
+    assert [w for s in run(system, 1e-3, until) for w in s.warnings] == []
+
+
+def test_a_motion_given_later_may_be_jolted():
+    """A jolt is no error of the steps, in whichever of them; none of it divides by zero."""
+    system = replace(hanging_chain(), gravity=(0, 0, 0))
+    rest = run(system, 1e-3, 2e-3)[-1].state
+    thrown = np.zeros((5, 3))
+    thrown[:, 2] = 1.0  # all of which the joint on the ground takes
+    given = replace(rest, motion=rest.motion._replace(velocity=thrown))
+    steps = run(system, 1e-3, 5e-3, start=given)
+    assert steps[0].energies.joints == pytest.approx(-0.5 * 5 * system.bodies[0].mass)
+    assert [w for s in steps for w in s.warnings] == []
+    again = run(system, 1e-3, 5e-3, start=steps[0].state)[-1].state
+    assert again.lost == steps[-1].state.lost
+    np.testing.assert_array_equal(again.motion.velocity, steps[-1].state.motion.velocity)
+
+
+def turntable(mu):
+    """A disc on the floor with a hinge about the vertical."""
+    disc = RigidBody(cuboid((1, 1, 0.1)), position=(0, 0, 0.05), spin=(0, 0, 5), name="table")
+    joints = [Joint(0, GROUND, (0, 0, z)) for z in (0.05, 0.2)]
+    return RigidBodies([disc], [FLOOR], mu=mu, joints=joints)
+
+
+def test_friction_of_a_contact_whose_normal_joints_decide_is_not_lost():
+    """Between no load of the floor and all of it; which of these the warning leaves open."""
+    steps = run(turntable(0.5), 1e-3, 0.05)
+    free = 5 - 0.05 * 0.5 * G * np.sqrt(0.5) / (
+        1 / 6
+    )  # torque mu m g a / sqrt 2 of four corners
+    spin = steps[-1].state.motion.spin[0, 2]
+    assert free - 1e-3 < spin < 4.9
+    (said,) = [w for s in steps for w in s.warnings]
+    assert said.name == "friction-undetermined"
+    assert "body 0 'table' and a plane" in said.message
+    (smooth,) = run(turntable(0.0), 1e-3, 1e-3)
+    assert smooth.state.motion.spin[0, 2] == pytest.approx(5, abs=1e-9)
+    assert smooth.warnings == ()
+
+
+@pytest.mark.parametrize("side", [1e-2, 1e2])
+def test_what_a_joint_decides_depends_on_its_own_bodies_alone(side):
+    """A joint elsewhere, of a body that is far lighter or heavier, changes nothing."""
+
+    def end(*others):
+        spin = np.array([0, -2.0, 0])
+        at = np.array([0.5, 0, 0.5])
+        block = RigidBody(
+            cuboid((1, 0.4, 1)), position=at, spin=spin, velocity=np.cross(spin, at)
+        )
+        joints = [Joint(0, GROUND, (0, y, 0)) for y in (-0.2, 0.2)]
+        joints += [Joint(1, GROUND, (400 - side, y, 400)) for y in (0, side) if others]
+        system = RigidBodies([block, *others], [FLOOR], joints=joints)
+        return run(system, 2e-3, 0.02, tolerance=1e-10, overlap=1e-2)[-1]  # none to mend
+
+    other = RigidBody(cuboid((side, side, side)), position=(400, 0, 400))
+    np.testing.assert_allclose(end(other).position[0], end().position[0], atol=1e-8)
+
+
+def test_perpendicular_walls_do_not_face_each_other():
+    """Turned ones make a cosine of a rounding's size."""
+    at = np.array([0, 0])
+    turned = np.array([[np.cos(a), np.sin(a), 0] for a in (0.7, 0.7 + 0.5 * np.pi)])
+    turned[1, 0] -= 1e-16
+
+    def faces(normals):
+        axes = np.stack([np.stack([n, n, n]) for n in normals])
+        rows = Rows(at, at - 1, axes, np.zeros((2, 3)), np.zeros((2, 3)))
+        return between_planes(rows, 2, normals, 1)
+
+    assert not faces(turned)
+    assert faces(np.array([turned[0], -turned[0]]))

@@ -21,14 +21,17 @@ from .rows import Rows, delassus
 from .sweeping import FEWEST, WORK, Search, found_quickly
 
 Array = NDArray[np.float64]
-SOFT = 0.05  # of the mean trace of W_ii: how much contacts give way at first
+SOFT = 0.05  # of the trace of its own W_ii: how much a contact gives way at first
 EARLY = 1e-6  # error of that
-SAME = 1e-9  # 1 - cosine of two normals that are one
+SAME = 1e-9  # 1 - cosine of two normals that are one; cosine of two that are perpendicular
 
 
 def between_planes(rows: Rows, contacts: int, normals: Array, bodies: int) -> bool:
-    """True where a body touches two planes that face each other; normals (p, 3) of all."""
-    opposed = normals @ normals.T < 0.0
+    """True where a body touches two planes that face each other; normals (p, 3) of all.
+
+    They do where their normals are more than a right angle apart: a wedge faces itself.
+    """
+    opposed = normals @ normals.T < -SAME
     if not opposed.any():
         return False
     on = np.flatnonzero(rows.master[:contacts] < 0)
@@ -48,7 +51,8 @@ def least_squeezed(
     """
     data = posed.data.copy()
     own = data[posed.diagonal]
-    data[posed.diagonal] = own + SOFT * np.trace(own, axis1=1, axis2=2).mean() * np.eye(3)
+    gives = SOFT * np.trace(own, axis1=1, axis2=2)
+    data[posed.diagonal] = own + gives[:, None, None] * np.eye(3)
     soft = Search(posed._replace(data=data), rows, R, bodies, contacts, mu, EARLY)
     found = soft.sweep(soft.r, max(FEWEST, WORK // max(len(posed.indices), 1)), 0)
     r = soft.latest if found is None else found.r

@@ -8,11 +8,15 @@ least impulses, r = -W_JJ^+ u_b with u_b = u at the beginning of the step.  What
 fourth order in the step else, as turning alone makes u_b of second order.
 
 A contact with the row g of its normal hangs on the joints by X = W_JJ^+ G_J g^T; where nothing
-is left of it besides, |g|^2 = g G_J^T X, joints decide its motion and it can change nothing: it
-is left out, with reactions that would only squeeze (a joint at a corner that stands on a plane
-says what the contact says).
+is left of it besides, |g|^2 = g G_J^T X, joints decide the motion along it, and its normal
+reaction can change nothing.  Where joints decide its tangents as well, or friction is none, it
+is left out (a joint at a corner that stands on a plane says what the contact says).  Else it
+can slide, as a turntable on a floor with a hinge about the normal: it takes part, for its
+friction, though equilibrium of rigid bodies does not say which part of the load it carries and
+which the joints; `undetermined` names it.
 
-W_JJ^+ is (W_JJ + e)^-1 with a small e: rows that say something twice get equal shares.
+W_JJ^+ is (W_JJ + e)^-1 with a small e: rows that say something twice get equal shares.  It
+is a part of the mean diagonal of those joints that are linked by bodies, of no others.
 """
 
 from __future__ import annotations
@@ -22,7 +26,8 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 from scipy import sparse
-from scipy.sparse.linalg import splu
+from scipy.sparse.csgraph import connected_components
+from scipy.sparse.linalg import SuperLU, splu
 
 from .bodies import GROUND, RigidBodies
 from .rows import Rows, impulses, levers_of, rotations, velocities
@@ -31,6 +36,7 @@ Array = NDArray[np.float64]
 Index = NDArray[np.int64]
 SMALL = 1e-12  # e over the mean of the diagonal of W_JJ
 DECIDED = 1e-9  # of |g|^2: what is left of a contact that joints decide; SMALL is in it
+AT_ONCE = 64  # contacts whose X are formed together, dense
 
 
 def lever_matrix(levers: Array, sides: Index, bodies: int) -> Any:
@@ -47,10 +53,26 @@ def lever_matrix(levers: Array, sides: Index, bodies: int) -> Any:
 
 
 class Hung(NamedTuple):
-    """What contacts hang on: X (3 k, nc), and which of them joints do not decide."""
+    """How nc contacts hang on k joints.
 
-    by: Array
-    free: NDArray[np.bool_]
+    shared: G_J g^T, sparse (3 k, nc), of their normals; factors: W_JJ^+; loose (nc,): joints do
+    not decide the motion along the normal; idle (nc,): they decide all of it.
+    """
+
+    shared: Any
+    factors: SuperLU
+    loose: NDArray[np.bool_]
+    idle: NDArray[np.bool_]
+
+    def only(self, kept: NDArray[np.bool_]) -> Hung:
+        """The same without the contacts that are not kept, (nc,)."""
+        return self._replace(
+            shared=self.shared[:, kept], loose=self.loose[kept], idle=self.idle[kept]
+        )
+
+    def pulled(self, u: Array) -> Array:
+        """X^T u, (nc,), of velocities u (k, 3) of the joints."""
+        return self.shared.T @ self.factors.solve(u.ravel())
 
 
 class Joints:
@@ -64,6 +86,10 @@ class Joints:
         self.jointed = np.zeros(len(bodies) + 1, dtype=bool)  # the last one is the ground
         self.jointed[self.first] = True
         self.jointed[self.second[self.second != GROUND]] = True
+        pairs = self.first, np.where(self.second == GROUND, self.first, self.second)
+        graph = sparse.coo_array((np.ones(len(joints)), pairs), (len(bodies), len(bodies)))
+        groups = connected_components(graph, directed=False)[1][self.first]
+        self.linked = np.unique(groups, return_inverse=True)[1]  # its group, of each joint
         x = np.array([body.position for body in bodies])
         R = rotations(np.array([body.orientation for body in bodies]))
         point = np.array([joint.point for joint in joints], dtype=float).reshape(-1, 3)
@@ -90,8 +116,9 @@ class Joints:
         """G_J, sparse, and W_JJ^+ as factors."""
         G = lever_matrix(*self._levers(rows, R), len(self.masses))
         W = G @ G.T
-        e = SMALL * W.diagonal().mean()
-        return G, splu((W + e * sparse.eye_array(W.shape[0])).tocsc())
+        own = W.diagonal().reshape(-1, 3).mean(axis=1)
+        e = SMALL * np.bincount(self.linked, own) / np.bincount(self.linked)
+        return G, splu((W + sparse.diags_array(np.repeat(e[self.linked], 3))).tocsc())
 
     def kept(
         self, velocity: Array, omega: Array, x: Array, R: Array
@@ -106,15 +133,30 @@ class Joints:
         work = 0.5 * float(np.sum(r * (before + velocities(rows, after, turned))))
         return after, turned, r, work
 
-    def hung(self, contacts: Rows, joints: Rows, R: Array) -> Hung | None:
-        """What contacts hang on; None where none of them has a jointed body."""
+    def hung(self, contacts: Rows, joints: Rows, R: Array, mu: float) -> Hung | None:
+        """How contacts hang on the joints; None where none of them has a jointed body."""
         theirs = self.jointed[contacts.slave] | self.jointed[contacts.master]
         if not theirs.any():
             return None
         G, factors = self._mobility(joints, R)
         levers, sides = self._levers(contacts, R)
         normals = lever_matrix(levers[:, :, :1], sides, len(self.masses))
-        shared = (G @ normals.T).toarray()
-        by = factors.solve(shared) if shared.size else shared
-        whole = normals.multiply(normals).sum(axis=1)
-        return Hung(by, whole - (shared * by).sum(axis=0) > DECIDED * whole)
+        shared = (G @ normals.T).tocsc()
+        loose = np.ones(len(theirs), dtype=bool)
+        loose[theirs] = _left(normals[theirs], shared[:, theirs], factors)
+        idle = ~loose
+        if mu > 0 and idle.any():
+            tangents = lever_matrix(levers[idle, :, 1:], sides[idle], len(self.masses))
+            slides = _left(tangents, (G @ tangents.T).tocsc(), factors).reshape(-1, 2)
+            idle[idle] = ~slides.any(axis=1)
+        return Hung(shared, factors, loose, idle)
+
+
+def _left(rows: Any, shared: Any, factors: SuperLU) -> NDArray[np.bool_]:
+    """Of which rows (n, 6 b) joints leave something free, by shared = G_J rows^T."""
+    whole = rows.multiply(rows).sum(axis=1)
+    decided = np.zeros(len(whole))
+    for k in range(0, len(whole), AT_ONCE):
+        some = shared[:, k : k + AT_ONCE].toarray()
+        decided[k : k + AT_ONCE] = (some * factors.solve(some)).sum(axis=0)
+    return whole - decided > DECIDED * whole

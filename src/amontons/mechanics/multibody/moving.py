@@ -29,12 +29,15 @@ so that joints do no work in the step.  (u1 = 0, the law of sticking contacts, t
 pendulum a part of its energy of first order: 7 % in five swings of 2 000 steps each.)  What
 joints take at the beginning of a step is all of a jolt, and else of third order in the whole.
 Contacts may take part in the motion by which joints are mirrored, or one near a joint would
-stop or throw the body; what joints decide altogether is no contact.
+stop or throw the body; what joints decide altogether is no contact, and where they decide the
+normal alone it is one for the sake of its friction.  Overlaps of both kinds are left: mending
+them would contradict the joints.
 
 Gravity that changes in time is that of the middle of a step.
 
-Energies: kinetic + potential gain what contacts do, r . (u0 + u1) / 2, and what the mending of
-overlaps does.  That is an identity of the scheme, to rounding.
+Energies: kinetic + potential gain what contacts do, r . (u0 + u1) / 2, what the mending of
+overlaps does, and what joints take at the beginning of a step.  That is an identity of the
+scheme, to rounding.
 
 [M] J. J. Moreau, "Unilateral contact and dry friction in finite freedom dynamics", CISM 302
 (1988).  [J] M. Jean, "The non smooth contact dynamics method", CMAME 177 (1999).
@@ -44,7 +47,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import replace
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -62,11 +65,20 @@ from .bodies import RigidBodies
 from .ends import ended, freely, middle_of
 from .guides import between_planes, least_squeezed
 from .joints import Joints
-from .meeting import Meetings, meetings
+from .meeting import meetings
+from .met import Met
 from .quick import Found, Posed, law_of, matched, pose
 from .rolling import couples, rolling_problem
 from .rows import Rows, delassus, impulses, rotations, rows_at, turned, velocities
-from .states import Motion, RigidEnergies, RigidState, RigidStep, overlap_at_start, too_long
+from .states import (
+    Motion,
+    RigidEnergies,
+    RigidState,
+    RigidStep,
+    overlap_at_start,
+    too_long,
+    undetermined,
+)
 from .sweeping import Search, found_quickly
 
 Array = NDArray[np.float64]
@@ -77,27 +89,6 @@ MENDED = 1e-6  # error of a mending that is let pass: what it leaves is mended i
 FAR = 1e-3  # of the smallest body, moved by mending, from which contacts are found again
 TOUCHING = 1e-9  # of a body, gaps up to which it touches
 NOTHING = np.zeros((0, 3))
-
-
-class _Met(NamedTuple):
-    """Contacts that were found, with their keys, and what they make with the joints."""
-
-    found: Meetings
-    keys: Index  # (nc, 3) slave, master, feature
-    rows: Rows
-    apart: Array  # (k, 3) sides of joints
-    by: Array | None  # (3 k, nc) how contacts hang on joints, where they do
-    deepest: float  # largest overlap or distance of the sides of a joint
-
-    def only(self, kept: NDArray[np.bool_]) -> _Met:
-        """The same without the contacts that are not kept, (nc,)."""
-        rows = np.concatenate([kept, np.ones(len(self.rows.slave) - len(kept), dtype=bool)])
-        found: list[Any] = [a[kept] for a in self.found]
-        those: list[Any] = [a[rows] for a in self.rows]
-        by = None if self.by is None else self.by[:, kept]
-        return self._replace(
-            found=Meetings(*found), keys=self.keys[kept], rows=Rows(*those), by=by
-        )
 
 
 def evolve_rigid(
@@ -167,6 +158,11 @@ def at_start(system: RigidBodies) -> RigidState:
     )
 
 
+def _timed(deadline: Deadline) -> bool:
+    """True where work is counted, or time is over."""
+    return deadline is not NEVER and (deadline.work is not None or deadline.passed)
+
+
 class _Stepping:
     """A system with what all steps share."""
 
@@ -184,6 +180,7 @@ class _Stepping:
         self.near = TOUCHING * system.packed.reach
         self.normals: Array = system.packed.planes[:, :3]
         self.joints = Joints(system, masses, self.inverse) if len(system.joints) else None
+        self.told = False  # that friction is undetermined
 
     # ------------------------------------------------------------------ a step
     def advance(self, state: RigidState, time: float, deadline: Deadline) -> RigidStep:
@@ -218,6 +215,7 @@ class _Stepping:
                 self._mirror(at, R, before.velocity, free[1], posed.q)
             what = f"step {state.index + 1}"
             if self.system.has_moments:
+                posed = self._unsqueezed(at.rows, R, posed, nc, deadline)
                 solved = self._rolled(at, R, posed, free[1], state, what, deadline)
                 r, moments = solved.r[:, :3].copy(), solved.r[:, 3:].copy()
                 turn = couples(at.rows, moments, len(masses))
@@ -229,12 +227,13 @@ class _Stepping:
         )
         kinetic, potential, gain, contact, mending = energies
         done = RigidEnergies(kinetic, potential, gain + lost, contact, mending, taken)
-        new = RigidState(
-            state.index + 1, time, Motion(*motion), at.keys, r[:nc], moments, state.lost,
-            state.fastest,
-        ).with_lost(taken, kinetic)  # fmt: skip
+        fallen = 0.5 * float(masses.sum() * (h * gravity) @ (h * gravity))
+        loss = state.loss_after(taken, kinetic, fallen, self.asked.tolerance)
+        end = Motion(*motion)
+        new = RigidState(state.index + 1, time, end, at.keys, r[:nc], moments, *loss, end)
+        said = self._said_of(state, new) + self._undetermined(at)
         return RigidStep(self.system, new, at.found, at.rows.axes[:nc], r[:nc], r[nc:] + jolt,
-                         done, solved, self._said_of(state, new))  # fmt: skip
+                         done, solved, said)  # fmt: skip
 
     def _said_of(self, state: RigidState, new: RigidState) -> tuple[ResultWarning, ...]:
         """What a step has to say: the first about the state that it begins with."""
@@ -244,28 +243,37 @@ class _Stepping:
         found = meetings(self.system.packed, x, R, self.near)
         return overlap_at_start(self.system, found, self.overlap)
 
-    def _rows(self, x: Array, R: Array, apart: Array | float = 0.0) -> _Met:
+    def _undetermined(self, at: Met) -> tuple[ResultWarning, ...]:
+        """Said once of the first contact whose normal joints decide."""
+        if self.told or at.loose.all():
+            return ()
+        self.told = True
+        which = int(np.argmin(at.loose))
+        return undetermined(self.system, *at.keys[which, :2].tolist())
+
+    def _rows(self, x: Array, R: Array, apart: Array | float = 0.0) -> Met:
         """Contacts and joints of bodies at x, turned by R; apart (n,): gaps that count."""
         found = meetings(self.system.packed, x, R, self.near + apart)
         keys, axes, arms, others, deepest = rows_at(*found, x)
         rows = Rows(found.slave, found.master, axes, arms, others)
         if self.joints is None:
-            return _Met(found, keys, rows, NOTHING, None, deepest)
+            return Met(found, keys, rows, NOTHING, None, deepest)
         joints, sides = self.joints.rows(x, R)
-        hung = self.joints.hung(rows, joints, R)
+        hung = self.joints.hung(rows, joints, R, self.system.mu)
         rows_of_all: list[Any] = [np.concatenate(p) for p in zip(rows, joints, strict=True)]
         both = Rows(*rows_of_all)
         widest = float(np.abs(sides).max())
         if hung is None:
-            return _Met(found, keys, both, sides, None, max(deepest, widest))
-        at = _Met(found, keys, both, sides, hung.by, 0.0).only(hung.free)
-        return at._replace(deepest=max(-at.found.gaps.min(initial=0.0), widest))
+            return Met(found, keys, both, sides, None, max(deepest, widest))
+        at = Met(found, keys, both, sides, hung, 0.0).only(~hung.idle)
+        gaps = at.found.gaps[at.loose]
+        return at._replace(deepest=max(-gaps.min(initial=0.0), widest))
 
-    def _closed(self, at: _Met, gaps: Array) -> _Met:
+    def _closed(self, at: Met, gaps: Array) -> Met:
         """What is left of contacts that were mended, with their gaps (nc,) after that."""
         found = at.found
         apart = np.where(found.master >= 0, self.near[found.master], 0.0)
-        kept = gaps <= self.near[found.slave] + apart
+        kept = (gaps <= self.near[found.slave] + apart) | ~at.loose
         return at._replace(found=found._replace(gaps=gaps), deepest=0.0).only(kept)
 
     def _kept(self, motion: Motion) -> tuple[Motion, Array, tuple[float, float]]:
@@ -283,14 +291,14 @@ class _Stepping:
         turning = np.einsum("bi,bij,bj->b", motion.spin, inertia, motion.spin)
         return 0.5 * float((masses * (motion.velocity**2).sum(axis=1) + turning).sum())
 
-    def _mirror(self, at: _Met, R: Array, v: Array, spin: Array, q: Array) -> None:
+    def _mirror(self, at: Met, R: Array, v: Array, spin: Array, q: Array) -> None:
         """Add to free velocities q (n, 3) what joints take back; spin (n, 3): W_f."""
         nc = len(at.keys)
         those: list[Any] = [part[nc:] for part in at.rows]
         u_m = velocities(Rows(*those), v, np.einsum("bij,bj->bi", R, spin))
         q[nc:] += u_m
-        if at.by is not None:
-            q[:nc, 0] -= np.minimum(-(u_m.ravel() @ at.by), 0.0)
+        if at.hung is not None:
+            q[:nc, 0] -= np.minimum(-at.hung.pulled(u_m), 0.0)
 
     # ------------------------------------------------------------------ problems
     def _solve(
@@ -300,13 +308,10 @@ class _Stepping:
 
         By sweeps alone where no solver is asked for, and no time is counted or over.
         """
-        mu, asked = self.system.mu, self.asked
-        timed = deadline is not NEVER and (deadline.work is not None or deadline.passed)
-        if self.solver is None and not timed:
-            given = R, self.bodies
-            if mu > 0 and between_planes(rows, contacts, self.normals, len(R)):
-                posed = least_squeezed(rows, *given, posed, contacts, mu, asked.tolerance)
-            search = Search(posed, rows, *given, contacts, mu, asked.tolerance)
+        mu = self.system.mu
+        posed = self._unsqueezed(rows, R, posed, contacts, deadline)
+        if self.solver is None and not _timed(deadline):
+            search = Search(posed, rows, R, self.bodies, contacts, mu, self.asked.tolerance)
             found, start = found_quickly(search)
             if found is not None:
                 return found
@@ -314,8 +319,19 @@ class _Stepping:
         law = law_of(contacts, len(posed.q) - contacts, mu)
         return self._driven(posed.problem(law), posed.start, what, deadline)
 
+    def _unsqueezed(
+        self, rows: Rows, R: Array, posed: Posed, contacts: int, deadline: Deadline
+    ) -> Posed:
+        """Started without squeeze between planes; as it is where work is counted or over."""
+        mu = self.system.mu
+        if mu == 0 or _timed(deadline):
+            return posed
+        if not between_planes(rows, contacts, self.normals, len(R)):
+            return posed
+        return least_squeezed(rows, R, self.bodies, posed, contacts, mu, self.asked.tolerance)
+
     def _rolled(  # noqa: PLR0913
-        self, at: _Met, R: Array, posed: Posed, spin: Array, state: RigidState, what: str,
+        self, at: Met, R: Array, posed: Posed, spin: Array, state: RigidState, what: str,
         deadline: Deadline,
     ) -> FrictionSolution:  # fmt: skip
         """Impulses and moments, (nc, 6), where contacts resist rolling or spinning."""
@@ -344,7 +360,7 @@ class _Stepping:
         return solution
 
     def _mended(
-        self, at: _Met, R: Array, what: str, deadline: Deadline
+        self, at: Met, R: Array, what: str, deadline: Deadline
     ) -> tuple[tuple[Array, Array], Array] | None:
         """Displacements and rotations (n, 3) that take overlaps away, and the gaps then.
 
@@ -352,6 +368,8 @@ class _Stepping:
         """
         if at.deepest <= self.overlap:
             return None
+        gaps, loose = at.found.gaps.copy(), at.loose
+        at = at.only(loose)
         rows, nc, masses = at.rows, len(at.keys), self.bodies[0]
         q = np.zeros((len(rows.slave), 3))
         q[:nc, 0] = at.found.gaps + 0.5 * self.overlap
@@ -369,7 +387,8 @@ class _Stepping:
             found = self._driven(problem, posed.start, what, deadline, MENDED)
         push, turn = impulses(rows, found.r, len(masses))
         moved = push / masses[:, None], np.einsum("bij,bj->bi", inverse, turn)
-        return moved, found.u[:nc, 0] - 0.5 * self.overlap
+        gaps[loose] = found.u[:nc, 0] - 0.5 * self.overlap
+        return moved, gaps
 
     def _shifted(self, motion: Motion, by: tuple[Array, Array], R: Array) -> Motion:
         """The bodies moved and turned, with the velocities that they have in own axes."""

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from functools import cached_property
 from typing import NamedTuple
 
@@ -44,14 +44,24 @@ class RigidState:
     keys: Index  # (nc, 3) slave, master and feature of the last contacts
     impulses: Array  # (nc, 3) theirs, in their frames
     moments: Array = field(default_factory=lambda: np.zeros((0, 3)))  # (nc, 3) or none
-    lost: float = 0.0  # energy that joints took after the first step, an error of the steps
-    fastest: float = 0.0  # the largest kinetic energy so far
+    lost: float = 0.0  # energy that joints took without a jolt, an error of the steps
+    fastest: float = 0.0  # the largest kinetic energy so far, or what gravity gives in a step
+    reached: Motion | None = field(default=None, repr=False)  # by a step; others are jolted
 
-    def with_lost(self, work: float, kinetic: float) -> RigidState:
-        """The same, reached by a step in which joints did this work, from that energy."""
-        lost = 0.0 if self.index <= 1 else -work  # jolts of a first step are no error
-        fastest = max(self.fastest, kinetic)
-        return replace(self, lost=self.lost + lost, fastest=fastest)
+    def loss_after(
+        self, work: float, kinetic: float, fallen: float, tolerance: float
+    ) -> tuple[float, float]:
+        """`lost` and `fastest` after a step from here in which joints did this work.
+
+        kinetic: energy at its end; fallen: what gravity gives to free bodies in a step.  Bodies
+        at rest move by errors of the solves alone: slower motion than `fallen` is no scale, and
+        a loss of `tolerance` of it no error of the step.  A motion that somebody else has given
+        may be jolted, which is no error either, but leaves errors of its solve.
+        """
+        if self.motion is not self.reached:
+            return self.lost, max(self.fastest, kinetic, fallen, -tolerance * work)
+        counts = -work if -work > tolerance * fallen else 0.0
+        return self.lost + counts, max(self.fastest, kinetic, fallen, -work)
 
     @property
     def doubtful(self) -> bool:
@@ -63,13 +73,15 @@ class RigidState:
 class RigidEnergies:
     """Kinetic and potential energy at the end of a step, works within it.
 
-    joints <= 0: all of a jolt, and else what the size of the step costs, an error of it.
+    joints <= 0, where the step begins: all of a jolt, and else what the size of the step costs,
+    an error of it.  In the rest of the step joints do no work but what the tolerance leaves,
+    which `contact` has in it.
     """
 
     kinetic: float
     potential: float
     gain: float  # of both together
-    contact: float  # work of contacts
+    contact: float  # work of contacts, and of the solve's errors at joints
     mending: float  # of overlaps
     joints: float = 0.0  # work of joints
 
@@ -87,8 +99,9 @@ class RigidStep:
     in their frames, normal first; frames (nc, 3, 3) by rows; joints (k, 3): impulses on the
     first bodies, in global axes; moments (nc, 3): angular impulses where friction resists
     rolling or spinning, about the normal first, else none.  warnings: of the first step, where
-    bodies overlapped as they were given (`overlap_at_start`), and of the one in which the
-    energy that joints lose by long steps gets too much (`too_long`), else none.
+    bodies overlapped as they were given (`overlap_at_start`), of the one in which the energy
+    that joints lose by long steps gets too much (`too_long`), and of the first in which joints
+    decide the motion along the normal of a contact that slides (`undetermined`), else none.
     """
 
     system: RigidBodies
@@ -180,6 +193,18 @@ def too_long(before: RigidState, after: RigidState, step: float) -> tuple[Result
         f"third power: take steps of {0.5 * step:.3g} or less"
     )
     return (ResultWarning("joints-lose-energy", text),)
+
+
+def undetermined(system: RigidBodies, slave: int, master: int) -> tuple[ResultWarning, ...]:
+    """A warning where rigid bodies do not tell what load a contact with friction carries."""
+    other = "a plane" if master < 0 else _named(system, master)
+    text = (
+        f"joints decide the motion of {_named(system, slave)} and {other} along the normal of "
+        "their contact, not along it: equilibrium of rigid bodies does not say what load the "
+        "contact carries and what the joints, so that its friction is one of many answers; "
+        "leave the motion along the normal to the contact (a joint less), or take mu = 0"
+    )
+    return (ResultWarning("friction-undetermined", text),)
 
 
 def _named(system: RigidBodies, number: int) -> str:
