@@ -17,9 +17,8 @@ once.  Its coarse matrices follow (`spread_levels`), and are made anew only when
 gains far less than it did; another preconditioner also when many directions have changed.
 
 Coarse functions are cut off at held directions, as in truncated multigrid [KK]: coarse matrices
-are P' A P with the FAINT diagonal in all of D, and what a cycle gives to D is dropped.  With
-the whole diagonal a coarse function would cost energy for what is cut off anyway, and near
-contacts multigrid would do little.
+are P' A P with the FAINT diagonal in all of D, and what a cycle gives to D is dropped; with all
+of the diagonal they would cost energy for what is cut off, and multigrid do little there.
 
 [KK] R. Kornhuber, R. Krause, "Adaptive multigrid methods for Signorini's problem in linear
 elasticity", Comput. Visual. Sci. 4 (2001).
@@ -50,9 +49,8 @@ FAINT = 1e-6  # of the diagonal: keeps a coarse matrix regular whose functions a
 FIRST_WORSE = 8.0  # iterations per digit that are called bad whatever they were
 GAMG = {
     "pc_gamg_reuse_interpolation": True,
-    # Directions that supports hold keep zeros in the matrix.  With these as couplings, two
-    # processes got a level of tetrahedra whose largest eigenvalue was told as 2e15, so that its
-    # smoother did nothing; without them it is 1.8 on one, two and four.
+    # Directions that supports hold keep zeros.  With these as couplings two processes got a
+    # level of tetrahedra with 2e15 as its largest eigenvalue, not 1.8: no smoother at all.
     "pc_gamg_threshold": 0.0,
 }
 
@@ -130,18 +128,15 @@ class SpreadMatrix:
 
     def from_basis(self, v: Array) -> Array:
         """T v of own values (own,)."""
-        if self.T is None:
-            return v
-        self._x.array = v
-        self.T.mult(self._x, self._y)
-        return self._y.array_r.copy()
+        return v if self.T is None else self._product(self.T.mult, v)
 
     def load_in_basis(self, f: Array) -> Array:
         """T' f of own values (own,)."""
-        if self.T is None:
-            return f
-        self._x.array = f
-        self.T.multTranspose(self._x, self._y)
+        return f if self.T is None else self._product(self.T.multTranspose, f)
+
+    def _product(self, times: Callable[[Any, Any], None], v: Array) -> Array:
+        self._x.array = v
+        times(self._x, self._y)
         return self._y.array_r.copy()
 
     def force_from_basis(self, f: Array) -> Array:
@@ -270,10 +265,8 @@ class SpreadMatrix:
     # ------------------------------------------------------------------ products
     def times(self, x: Array) -> Array:
         """K x of own values (own,), held directions included."""
-        self._x.array = x
-        self.A.mult(self._x, self._y)
+        out = self._product(self.A.mult, x)
         self.touched.mult(self._x, self._rest)
-        out = self._y.array_r.copy()
         out[self.touched_rows] = self._rest.array_r
         return out
 

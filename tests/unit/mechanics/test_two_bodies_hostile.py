@@ -8,6 +8,7 @@ import pytest
 import amontons as am
 from amontons.mechanics.meshes import Facets
 from amontons.mechanics.model.large_deformation import large_deformation
+from amontons.mechanics.model.overlapping import overlap_at_start
 
 NEO = am.NeoHookean(1.0, 0.3)
 
@@ -288,17 +289,55 @@ def test_a_corner_that_is_inside_out_is_named_where_no_integration_point_is():
     [(am.LinearElastic(1.0, 0.3), 0.1, True), (NEO, 0.1, True), (NEO, 1e-3, False)],
 )
 def test_bodies_that_overlap_as_they_are_given_get_a_word(law, depth, told):
-    """With place and depth, static and in time; a press fit is thin, or says its clearance."""
+    """With place and depth, static and once in time; a press fit is thin, or says so."""
     heavy = replace(law, density=1.0)
     parts = [replace(body, material=heavy) for body in bodies(over=-depth)]
     one = model(parts, am.Fix("upper.top", 0))
     names = [w.name for w in am.solve(one).warnings]
     assert ("overlap-at-start" in names) == told
-    step = next(iter(am.evolve(one, am.MoreauJean(0.1), until=0.1)))
+    step, after = am.evolve(one, am.MoreauJean(0.1), until=0.2)
     found = [w for w in step.warnings if w.name == "overlap-at-start"]
     assert bool(found) == told
+    assert "overlap-at-start" not in [w.name for w in after.warnings]
     if told:
         assert "by 0.1 at (" in found[0].message
         meant = replace(one.contacts[0], clearance=-depth)
         said = replace(one, contacts=[meant])
         assert "overlap-at-start" not in [w.name for w in am.solve(said).warnings]
+
+
+def overlapping(*given):
+    """Messages of a model of bodies, (name, mesh), the first a slave of all others."""
+    parts = [am.Body(mesh, NEO, name=name) for name, mesh in given]
+    (slave, _), *masters = given
+    pairs = [am.Contact(f"{slave}.bottom", master=f"{name}.top", mu=0.0) for name, _ in masters]
+    held = [am.Fix(f"{slave}.top", 0)]
+    return [w.message for w in overlap_at_start(am.Model(parts, held, pairs), None)]
+
+
+def test_an_overlap_with_several_masters_is_told_as_with_one():
+    upper = "upper", am.box((2, 1), (4, 2), origin=(0, 0.8))
+    left, right = ((f"l{k}", am.box((1, 1), 2, origin=(k, 0))) for k in (0, 1))
+    (one,), (several,) = overlapping(upper, left), overlapping(upper, left, right)
+    for message in (one, several):
+        assert "overlap at the start by 0.2 at" in message
+
+
+def ring(radii, columns):
+    """A quarter of a ring: its bottom the inner surface."""
+    mesh = am.box((1, 1), (columns, 2))
+    angle = np.pi / 2 * (1 - mesh.points[:, 0])
+    r = radii[0] + (radii[1] - radii[0]) * mesh.points[:, 1]
+    return replace(mesh, points=np.stack([r * np.cos(angle), r * np.sin(angle)], axis=1))
+
+
+def test_chords_and_slivers_are_no_overlap_of_bodies():
+    """A coarse hub that touches a fine shaft; a thin press fit on a mesh with one sliver."""
+    assert not overlapping(("hub", ring((1, 1.5), 8)), ("shaft", ring((0.5, 1), 64)))
+    graded = am.box((1, 1), (5, 2))
+    x = graded.points.copy()
+    x[np.isclose(x[:, 0], 0.4), 0] = 0.2 + 1e-3
+    lower = "lower", replace(graded, points=x)
+    for depth, told in ((1e-3, False), (0.05, True)):
+        upper = "upper", am.box((1, 1), (4, 2), origin=(0, 1 - depth))
+        assert bool(overlapping(upper, lower)) == told

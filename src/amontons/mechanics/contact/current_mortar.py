@@ -3,8 +3,8 @@
 A pair has slave nodes p and a master surface.  All is taken at the positions x of all nodes:
 n_p is the unit normal at p, out of the master into the slave, the area average of the facets
 around it where they face the master, as what rises beyond a rim would tilt forces; of a node
-that faces nobody, in dynamics and under a given bound the average of whole facets.
-On every slave facet psi are the dual functions of `dual` on that part of it that
+that faces nobody, in dynamics, of ties and under a given bound (Tresca's law) that of whole
+facets.  On every slave facet psi are the dual functions of `dual` on that part of it that
 faces the master ([PSG]), D_p = int psi_p over all facets, and
 
     B_pp = 1,   B_pq = - int psi_p N_q / D_p  of master nodes q,   sum_j B_pj = 0,         (1)

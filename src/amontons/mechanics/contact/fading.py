@@ -25,9 +25,10 @@ which `local` of `current` tells, so that statuses and errors are those of the l
 while open, `closing`, is taken off z_T as (2) has it: for w = 0 off the mean force.  A bound
 that is a given number would stay whole however little faces a node: Tresca's law does not fade.
 
-Where the master ends with a facet kappa_s is 1/2, at a corner of quadrilaterals 5/12: such
-nodes bear whole, and FULL is less.  That holds for even meshes; kappa_s is 1/3 where the facet
-beyond is twice as long, or at a corner with one of six triangles, and such nodes fade a little.
+Where the master ends with a facet kappa_s is 1/2, at a corner of quadrilaterals 5/12, and 1/3
+where the facet beyond is twice as long, or at a corner with one of six triangles: such nodes
+bear whole, and FULL is less.  With a facet beyond k times as long kappa_s is 1 / (1 + k): a
+node at the end fades where the facet beyond it is more than three times as long.
 How much of a node beyond the end bears tells how wide the master acts.  So does the side that
 ends if it is the slave: its last node presses all of the master's facet that it stands within.
 Between evenly fine sides both are equally wide, in the mean over places of the end, with FULL

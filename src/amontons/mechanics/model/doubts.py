@@ -33,17 +33,19 @@ CHECKS: tuple[Check, ...] = (
     overlap_at_start,
     like_percent,
 )
+AT_FIRST = (overlap_at_start,)  # of how bodies are given: said once
 OF_THE_START = (sliding_beyond_pairs, sliding_beyond_curvature)  # its pairs, normals
 OF_WHERE_NODES_ARE = (held_facets, unfaced_slaves)  # where pairs are found there
 OF_MOTIONS = (large_rotation, *OF_THE_START, *OF_WHERE_NODES_ARE)
 
 
 def model_warnings(
-    model: Model, fields: ContactFields, converged: bool = True
+    model: Model, fields: ContactFields, converged: bool = True, *, first: bool = True
 ) -> tuple[ResultWarning, ...]:
     """All warnings about a solved state of a model, in the order of its checks.
 
-    What has not converged has no motion that could be judged.
+    What has not converged has no motion that could be judged.  first: no step went before.
     """
-    checks = [c for c in model.formulation.doubts if converged or c not in OF_MOTIONS]
+    left = (() if converged else OF_MOTIONS) + (() if first else AT_FIRST)
+    checks = [check for check in model.formulation.doubts if check not in left]
     return tuple(warning for check in checks for warning in check(model, fields))

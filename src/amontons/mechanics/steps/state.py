@@ -195,7 +195,7 @@ class TimeStep(Shown):
     def warnings(self) -> tuple[ResultWarning, ...]:
         """Reasons to doubt a step that has converged, each with a name."""
         return self.solution.warnings + model_warnings(
-            self.model, self.fields, self.solution.converged
+            self.model, self.fields, self.solution.converged, first=self.state.index <= 1
         )
 
     @property

@@ -4,16 +4,16 @@ The problem is F(v) = 0, piecewise smooth, with a linearisation at every admissi
 `model.large_deformation`.  It is tried at full load at once; where that fails the load grows in
 steps from a state that is known, each begun by one of `predictors`: where Newton's method fails
 from one the next is tried.  `step_lengths` says how far steps go.  Where two bodies slide and a
-state under load is known, a Newton step that passes the test in no part ends the attempt, but
-that from the last predictor: there bodies creep on (`creeping`), whatever the load step, as cut
-ones lead to the same state by more Newton steps.  Where bodies do not come to rest the load
-step is cut, and where they do not in a SHORT one load steps begin anew, with patience for
-steps that do not pass.
+state under load is known, a Newton step that passes the test in no part ends the attempt.
+After the last predictor, however that ends, bodies creep on (`creeping`) from the first state
+where an attempt ended so, whatever the load step, as cut ones lead to the same state by more
+Newton steps.  Where bodies do not come to rest the load step is cut, and where they do not in a
+SHORT one load steps begin anew, with patience for steps that do not pass.
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Generator, Iterator
 from dataclasses import dataclass
 from typing import Any, ClassVar, Protocol
 
@@ -161,34 +161,48 @@ class NonlinearNewton:
                     f"no equilibrium found beyond {share:.4g} of the load: {reason}{hint}"
                 )
             goal = min(1.0, share + step)
-            arrived, before, note = False, 0, shown.note
-            ways = predictors(problem)
+            before, note, stuck = shown.waiting, shown.note, None
+            arrived: Array | None = None
             shown.brief = creeping_helps and loaded
-            for predict in ways:
-                creeps = shown.brief and predict is ways[-1]
+            for predict in (*predictors(problem), None):
                 try:
-                    first = predict(problem, share, goal, v, target, linear)
-                    if goal == 1.0:
-                        states = problem.states(first, (problem.at_share(share), v))
-                        found = self._newton(problem, states, target, linear, shown, creeps)
-                        yield from shown.best(found)
-                    then = problem.at_share(goal)
-                    states = then.states(first, (problem.at_share(share), v))
-                    found = self._newton(then, states, target, linear, shown, creeps)
+                    first = stuck
+                    if predict is not None:
+                        first = predict(problem, share, goal, v, target, linear)
+                    if first is None:  # nowhere to creep from
+                        break
                     before = shown.waiting
-                    v = shown.reached(found, then, states.v(states.start))
-                    arrived = True
+                    arrived = yield from self._reached(
+                        problem, (share, goal, v), first, target, linear, shown, predict is None
+                    )
                     break
                 except (Failed, InvertedCells) as failure:
-                    reason = str(failure)
-                    shown.note = note
-            if arrived:
-                share = goal
+                    reason, shown.note = str(failure), note
+                    if stuck is None and isinstance(failure, _Stuck):
+                        stuck = failure.v
+            if arrived is not None:
+                share, v = goal, arrived
                 step *= 2 if shown.waiting - before <= EASY else 1
             elif shown.brief and step <= SHORT:
                 step = 0.0
             else:
                 step = (goal - share) / (4 if goal - share == 1.0 else 2)
+
+    def _reached(
+        self, problem: NonlinearProblem, way: tuple[float, float, Array], first: Array,
+        target: Target, linear: LinearSteps, shown: _Shown, creeps: bool,
+    ) -> Generator[Iterate, None, Array]:  # fmt: skip
+        """The state at a share of the load, from first; way: shares, the state at the lower."""
+        share, goal, v = way
+        known = problem.at_share(share), v
+        if goal == 1.0:
+            states = problem.states(first, known)
+            found = self._newton(problem, states, target, linear, shown, creeps)
+            yield from shown.best(found)
+        then = problem.at_share(goal)
+        states = then.states(first, known)
+        found = self._newton(then, states, target, linear, shown, creeps)
+        return shown.reached(found, then, states.v(states.start))
 
     def _newton(
         self, problem: NonlinearProblem, states: States, target: Target, linear: LinearSteps,
@@ -196,10 +210,16 @@ class NonlinearNewton:
     ) -> Iterator[tuple[Array, Array, float]]:  # fmt: skip
         """(v, r, |F| one step before) of Newton steps; Failed when they lead nowhere.
 
-        creeps: over a jump, once.
+        creeps: over a jump first.
         """
         sizes: list[float] = []
         patience, w = Patience(self.patience), states.start
+        if creeps:
+            shown.note = CREPT
+            for way in creeping(problem, states.v(w), self.halvings, linear, target):
+                shown.waiting += 1
+                yield way, problem.reactions(way), np.inf
+                w = problem.states(way).start
         while target.seconds_left > 0:
             v = states.v(w)
             try:
@@ -220,18 +240,10 @@ class NonlinearNewton:
                 length, goes = by_natural_test(problem, states, w, step, factor, self.halvings)
             else:
                 length = by_residual(states, w, step, sizes, self.halvings)
-            if not goes and shown.brief and not creeps:
-                raise Failed("no part of a Newton step leads nearer")
-            if goes or not creeps:
-                w = w + length * step
-                yield states.v(w), problem.reactions(states.v(w)), size
-                continue
-            for way in creeping(problem, v, self.halvings, linear, target):
-                shown.waiting += 1
-                yield way, problem.reactions(way), np.inf
-                w = problem.states(way).start
-            creeps, shown.note = False, CREPT
-            sizes, patience = [], Patience(self.patience)
+            if not goes and shown.brief:
+                raise _Stuck(v)
+            w = w + length * step
+            yield states.v(w), problem.reactions(states.v(w)), size
         raise Breakdown("out of time between two load steps")
 
     @staticmethod
@@ -241,6 +253,14 @@ class NonlinearNewton:
         if problem.error(problem.reactions(v), v) <= LOOSE:
             raise Breakdown(reason)
         raise Failed(reason)
+
+
+class _Stuck(Failed):
+    """A Newton step from v (n,) passes the test in no part."""
+
+    def __init__(self, v: Array) -> None:
+        super().__init__("no part of a Newton step leads nearer")
+        self.v = v
 
 
 @dataclass
