@@ -306,7 +306,8 @@ def main() -> None:
         "## Cubic elements", "",
         "A beam on two sliding supports, four modes: against the modes of the discrete beam, "
         "and those of the beam; eps cond: what rounding of the entries of K may do to the "
-        "first one.",
+        "first one. Mode j of n elements is (j pi / n)^4 / 1440 above that of the beam (8e-8 "
+        "for mode 2 of 60): what `modes` adds is the distance from the discrete beam.",
         "", "| elements | system | against discrete | against the beam, modes 1 and 2 | "
         "eps cond |",
         "|---|---|---|---|---|", *shown(element_rows()), "",

@@ -5,7 +5,10 @@ import pytest
 from scipy import sparse
 
 import amontons as am
+from amontons.analysis.stability import coalescence
 from amontons.analysis.stability import modes as module
+from amontons.analysis.stability.coalescence import flutter_points
+from amontons.analysis.stability.sliding import SlidingState
 
 # the minimal model of Hoffmann, Fischer, Allgaier, Gaul (2002): a mass on a belt, held by two
 # inclined springs; the third one is that of its contact
@@ -83,6 +86,66 @@ def test_the_first_flutter_friction_where_three_modes_take_part(seed):
         middle = 0.5 * (low + high)
         low, high = (low, middle) if grows(middle) else (middle, high)
     assert found.flutter()[0].mu == pytest.approx(high, rel=1e-6)
+
+
+SEEDS = [(2, 8, 3), (3, 8, 3), (5, 8, 3)]
+
+
+def held_obliquely(seed, size, contacts):
+    """Rigid contacts whose friction changes what presses them."""
+    rng = np.random.default_rng(seed)
+    A, B = rng.normal(size=(2, size, size))
+    Q = np.linalg.qr(rng.normal(size=(size, size)))[0]
+    N = sparse.csc_array(Q[:, :contacts])
+    along = Q[:, contacts : 2 * contacts] * rng.choice([-1, 1], contacts)
+    along += 0.5 * rng.normal(size=along.shape) / np.sqrt(size)
+    return SlidingState(
+        sparse.csc_array(np.eye(size) + 0.1 * B @ B.T), None,
+        sparse.csc_array(A @ A.T + 0.3 * np.eye(size)), N, sparse.csc_array(-0.05 * along),
+        sparse.csr_array(N.T), sparse.csc_array((contacts, contacts)), 0.05, contacts,
+    )  # fmt: skip
+
+
+def squares(state, mu):
+    """s^2 of all modes at a friction."""
+    K, _, M, _ = module.projected(state, mu / state.mu)
+    return -np.linalg.eigvals(np.linalg.solve(M, K))
+
+
+@pytest.mark.parametrize(("seed", "size", "contacts"), SEEDS)
+def test_no_point_of_flutter_is_missed(seed, size, contacts):
+    """Rigid contacts: friction changes the pressure also where no mode moves."""
+    state = held_obliquely(seed, size, contacts)
+
+    def growing(mu):
+        found = squares(state, mu)
+        return int((found.imag > 1e-7 * np.abs(found)).sum())
+
+    frictions = np.geomspace(0.02, 3.0, 400)
+    counts = [growing(mu) for mu in frictions]
+    wanted = []
+    for k in np.flatnonzero(np.diff(counts) > 0):
+        low, high = frictions[k], frictions[k + 1]
+        for _ in range(40):
+            middle = 0.5 * (low + high)
+            low, high = (low, middle) if growing(middle) > counts[k] else (middle, high)
+        found = squares(state, high)
+        pair = found[found.imag > 1e-7 * np.abs(found)]
+        if pair[np.argmin(pair.imag / np.abs(pair))].real < 0:
+            wanted.append(high)
+    told = flutter_points(state, 6, 20)
+    assert wanted
+    for mu in wanted:
+        assert min(abs(point.mu / mu - 1) for point in told) < 1e-6
+    assert not told.warnings
+
+
+def test_points_that_are_not_found_are_told(monkeypatch):
+    monkeypatch.setattr(coalescence, "_newton", lambda *_: None)
+    found = on_a_belt(0.2).flutter()
+    assert not found
+    assert [doubt.name for doubt in found.warnings] == ["flutter-not-found"]
+    assert f"near friction {FLUTTER:.4g}" in found.warnings[0].message
 
 
 def test_damping_by_hand():

@@ -8,13 +8,15 @@ l [[M, 0], [0, 0]] is singular for modes.  Two of them meet where, with the bord
 
 g = 0 and dg/dl = 0 ([G]): two equations for l and p, solved by Newton's method on the whole
 sparse system; all derivatives of g come from solves with the same matrix and its transpose.
-Starts: the modes of p = 0, phi_i with forces rho_i, couple by P_ij = phi_i^T F_1 rho_j; each
-pair meets where the discriminant of its two by two problem is zero, a quadratic in p.  Where
-three modes take part that is far off, so that the small problem diag(l_i) - p P of all these
-modes is also followed over p: where more of its eigenvalues are complex than before, two have
-met.  Steps are divided where slopes tell that two would meet and part again within them.
-Newton's method on the small problem improves all starts.  A point is kept if the modes of the
-whole grow beyond it and not before.
+Near the point g = g_ll (l - l_0)^2 / 2 + g_p (p - p_0): l is complex beyond it, and one of the
+modes grows, where g_p g_ll > 0; such points are told.
+
+Starts are those of the slowest modes without friction, dense (`reduced`): where the eigenvalues
+of this small problem, followed over p, leave the real axis.  A pair that is still wide at its
+start has no g without poles nearby.  Where Newton's method ends nowhere or far from the start
+the pair is followed: with X, Y (n, 2) of its right and left motions, by inverse iteration at l,
+Y^T Q X and its derivative by p are two by two, the discriminant is a quadratic in p, and its
+next zero the next p.  What is not found even so is said in `warnings`.
 
 Divergence, l = 0, is an eigenvalue problem in p.  Damping shifts both; then `modes` tells.
 
@@ -23,30 +25,27 @@ Divergence, l = 0, is an eigenvalue problem in p.  Damping shifts both; then `mo
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy import linalg, sparse
+from scipy import sparse
 
 from ...core.errors import SingularOperator
-from .modes import modes_of
+from ...core.warned import ResultWarning
+from .bordered import Point, Sparse, iterate, same
+from .reduced import LARGEST, Reduced, starts
 from .sliding import SlidingState, factor
 
 Array = NDArray[np.float64]
-STEPS = 40  # of Newton's method
-DONE = 1e-13  # relative step at which it ends
-MODES = 24  # of p = 0 whose pairs are looked at
-CHECKED = 1e-3  # relative distance before and beyond a point at which modes are looked at
 SAME = 1e-7
-EPSILON = float(np.finfo(float).eps)
-LARGEST = 1e3  # friction beyond which nothing is looked for
 AHEAD = 1.2  # of the last point that is wanted: starts up to there are tried, too
-LEAST = 1e-4  # friction from which on the small problem is followed
-WALK = 280  # steps of that to LARGEST, in equal ratios
-HALVINGS = 8  # of such a step
-NARROWED = 14  # halvings around a point where modes meet, before Newton's method
+NEAR = 0.05  # relative distance from a start up to which a point is the one meant
+FOLLOWED = 40  # steps with a pair of modes
+LONGEST = 0.3  # such a step, relative
+CLOSE = 1e-6  # such a step at which Newton's method takes over
 
 
 @dataclass(frozen=True)
@@ -57,25 +56,61 @@ class Flutter:
     frequency: float
 
 
-def flutter_points(state: SlidingState, count: int, most: int) -> tuple[Flutter, ...]:
+class FlutterPoints(tuple[Flutter, ...]):
+    """Points, friction ascending; warnings: those that could not be made precise, in words."""
+
+    warnings: tuple[ResultWarning, ...]
+
+    def __new__(
+        cls, points: Iterable[Flutter] = (), warnings: tuple[ResultWarning, ...] = ()
+    ) -> FlutterPoints:
+        """With warnings."""
+        made = super().__new__(cls, points)
+        made.warnings = warnings
+        return made
+
+
+def flutter_points(state: SlidingState, count: int, most: int) -> FlutterPoints:
     """Frictions at which modes begin to grow, ascending; see the module."""
     state = replace(state, C=None)
     if not state.mu > 0 or not state.F_1.nnz:
-        return ()
-    known: list[float] = []
+        return FlutterPoints()
+    small = Reduced.of(state, max(count, 2))
+    known: list[Point] = []
+    failed: list[Point] = []
     out: list[Flutter] = []
-    for l, p in _starts(state, max(count, 2)):
-        if len(out) >= most and p > AHEAD * out[most - 1].mu / state.mu:
+    for start in starts(small, state.mu):
+        if len(out) >= most and start.p > AHEAD * out[most - 1].mu / state.mu:
             break
-        point = _newton(state, l, p)
-        if point is None or any(abs(point[1] - q) <= SAME * q for q in known):
-            continue
-        known.append(point[1])
-        if _begins(state, *point):
-            frequency = float(np.sqrt(point[0]) / (2 * np.pi))
-            out.append(Flutter(float(point[1] * state.mu), frequency))
-            out.sort(key=lambda each: each.mu)
-    return tuple(out[:most])
+        found = _points(state, small, start)
+        for point in found:
+            if any(same(point, other, SAME) for other in known):
+                continue
+            known.append(point)
+            if point.begins:
+                frequency = float(np.sqrt(point.l) / (2 * np.pi))
+                out.append(Flutter(float(point.p * state.mu), frequency))
+                out.sort(key=lambda each: each.mu)
+        if not any(same(point, start, NEAR) for point in found):
+            failed.append(start)
+    last = out[most - 1].mu if len(out) >= most else np.inf
+    return FlutterPoints(out[:most], _doubts(state, failed, known, last))
+
+
+def _doubts(
+    state: SlidingState, failed: list[Point], known: list[Point], last: float
+) -> tuple[ResultWarning, ...]:
+    """Of starts up to the last point told near which there is none."""
+    return tuple(
+        ResultWarning(
+            "flutter-not-found",
+            f"near friction {start.p * state.mu:.4g} two modes seem to meet at a frequency of "
+            f"{np.sqrt(start.l) / (2 * np.pi):.4g}, but the point was not found; ask for modes "
+            "at frictions around it",
+        )
+        for start in failed
+        if start.p * state.mu <= last and not any(same(p, start, NEAR) for p in known)
+    )
 
 
 def divergence_points(state: SlidingState) -> Array:
@@ -101,129 +136,18 @@ def divergence_points(state: SlidingState) -> Array:
     return np.sort(state.mu / real)
 
 
-def _starts(state: SlidingState, count: int) -> list[tuple[float, float]]:
-    """(l, p) near which two modes meet, ascending in p."""
-    still = replace(state, F_1=sparse.csc_array(state.F_1.shape), mu=0.0)
-    modes = modes_of(still, min(max(count, MODES), state.K.shape[0]))
-    l = -(modes.s**2).real
-    phi = modes.shapes.real.copy()
-    turned = np.abs(modes.shapes.imag).max(axis=0) > np.abs(phi).max(axis=0)
-    phi[:, turned] = modes.shapes.imag[:, turned]
-    norm = np.sqrt(np.einsum("nk,nk->k", phi, state.M @ phi))
-    keep = norm > 0
-    l, phi = l[keep], phi[:, keep] / norm[keep]
-    force = state.K @ phi - (state.M @ phi) * l
-    F = state.F_0
-    weight: Any = sparse.csc_array(F.T @ F)
-    rho = factor(weight).solve(F.T @ force)
-    P = phi.T @ (state.F_1 @ rho)
-    out: list[tuple[float, float]] = []
-    for i in range(len(l)):
-        for j in range(i + 1, len(l)):
-            # (l_i - x - p P_ii)(l_j - x - p P_jj) = p^2 P_ij P_ji
-            a, b = l[i] - l[j], P[i, i] - P[j, j]
-            for p in np.roots([b * b + 4 * P[i, j] * P[j, i], -2 * a * b, a * a]):
-                if abs(p.imag) <= 1e-2 * abs(p) and 0 < p.real < LARGEST / state.mu:
-                    x = 0.5 * (l[i] + l[j] - p.real * (P[i, i] + P[j, j]))
-                    out.append((float(x), float(p.real)))
-    out += _followed(l, P, LEAST / state.mu, LARGEST / state.mu)
-    dense = _Small(np.diag(l), P)
-    better = [dense.newton(*start) for start in out]
-    out = [b if b is not None else a for a, b in zip(out, better, strict=True)]
-    unique: list[tuple[float, float]] = []
-    for x, p in sorted(out, key=lambda point: point[1]):
-        if x > 0 and p > 0 and all(abs(p - q) > 1e-6 * q for _, q in unique):
-            unique.append((x, p))
-    return unique[: 4 * MODES]
-
-
-class _Spectrum:
-    """Eigenvalues of diag(l) - p P: real ones (k,), ascending, their slopes; complex pairs."""
-
-    def __init__(self, l: Array, P: Array, p: float) -> None:
-        self.p = p
-        found: Any = linalg.eig(np.diag(l) - p * P, left=True, right=True)
-        values, left, right = found
-        real = np.flatnonzero(values.imag == 0.0)
-        real = real[np.argsort(values.real[real], kind="stable")]
-        self.pairs = values[values.imag > 0]
-        self.real = values.real[real]
-        y, x = left.real[:, real], right.real[:, real]
-        size = np.einsum("nk,nk->k", y, x)
-        size = np.where(np.abs(size) > EPSILON, size, EPSILON)  # 0 of a double one: steep
-        self.slope = -np.einsum("nk,nk->k", y, P @ x) / size
-
-    def may_meet(self, p: float) -> bool:
-        """Whether two neighbours, with squared distances linear in p, meet before p."""
-        gap, rate = np.diff(self.real), np.diff(self.slope)
-        return bool((gap + 2 * rate * (p - self.p) < 0).any())
-
-
-def _followed(l: Array, P: Array, least: float, largest: float) -> list[tuple[float, float]]:
-    """(l, p), p ascending, near which eigenvalues of diag(l) - p P leave the real axis.
-
-    l (k,), P (k, k); p from least to largest.
-    """
-    out = []
-    places = np.geomspace(least, largest, WALK + 1)
-    last = _Spectrum(l, P, 0.0)
-    for place in places:
-        ahead = [(_Spectrum(l, P, float(place)), 0)]
-        while ahead:
-            there, depth = ahead[-1]
-            more = len(there.pairs) - len(last.pairs)
-            unclear = more > 1 or (
-                more <= 0 and (last.may_meet(there.p) or there.may_meet(last.p))
-            )
-            if unclear and depth < HALVINGS:
-                ahead[-1] = there, depth + 1
-                ahead.append((_Spectrum(l, P, 0.5 * (last.p + there.p)), depth + 1))
-                continue
-            if more > 0:
-                before, after = last, there
-                for _ in range(NARROWED):
-                    between = _Spectrum(l, P, 0.5 * (before.p + after.p))
-                    if len(between.pairs) > len(last.pairs):
-                        after = between
-                    else:
-                        before = between
-                new = after.pairs[np.argmin(after.pairs.imag)]
-                out.append((float(new.real), after.p))
-            last = there
-            ahead.pop()
+def _points(state: SlidingState, small: Reduced, start: Point) -> list[Point]:
+    """Points of the whole problem that a start leads to, the nearest one last."""
+    found = _newton(state, start.l, start.p)
+    out = [] if found is None else [found]
+    if not any(same(point, start, NEAR) for point in out):
+        nearer = _by_pair(state, start.l, start.p, *small.pair(start.l, start.p))
+        found = None if nearer is None else _newton(state, *nearer)
+        out += [] if found is None else [found]
     return out
 
 
-@dataclass(frozen=True, eq=False)
-class _Small:
-    """(A - p P) - l: the problem of some modes, dense."""
-
-    A: Array
-    P: Array
-
-    def newton(self, l: float, p: float) -> tuple[float, float] | None:
-        n = len(self.A)
-
-        def solver(l: float, p: float) -> Any:
-            return _Dense(self.A - p * self.P - l * np.eye(n))
-
-        return _iterate(solver, lambda x: -x, lambda x: -(self.P @ x),
-                        lambda x: -(self.P.T @ x), l, p)  # fmt: skip
-
-
-class _Dense:
-    def __init__(self, Q: Array) -> None:
-        left, values, right = np.linalg.svd(Q)
-        self.b, self.c = left[:, -1], right[-1]
-        whole = np.block([[Q, self.b[:, None]], [self.c[None], np.zeros((1, 1))]])
-        self.whole = whole
-
-    def solve(self, b: Array, *, transposed: bool) -> Array:
-        found: Any = np.linalg.solve(self.whole.T if transposed else self.whole, b)
-        return found
-
-
-def _newton(state: SlidingState, l: float, p: float) -> tuple[float, float] | None:
+def _newton(state: SlidingState, l: float, p: float) -> Point | None:
     """The point near (l, p) of the whole problem."""
     M, slope = state.wide(state.M), state.by_friction
     n = state.size
@@ -231,88 +155,47 @@ def _newton(state: SlidingState, l: float, p: float) -> tuple[float, float] | No
 
     def solver(l: float, p: float) -> Any:
         nonlocal b, c
-        made = _Sparse(sparse.csc_array(state.stiffness(p) - l * M), b, c)
+        made = Sparse(sparse.csc_array(state.stiffness(p) - l * M), b, c)
         b, c = made.b, made.c
         return made
 
     products = lambda x: -(M @ x), lambda x: slope @ x, lambda x: slope.T @ x
-    return _iterate(solver, *products, l, p)
+    return iterate(solver, *products, l, p)
 
 
-class _Sparse:
-    """The bordered matrix, with borders near the null vectors of Q."""
-
-    def __init__(self, Q: sparse.csc_array, b: Array, c: Array) -> None:
-        n = Q.shape[0]
-        for _ in range(1 if b is not c else 2):  # the solutions are better borders
-            self.b, self.c = b / np.linalg.norm(b), c / np.linalg.norm(c)
-            whole = sparse.block_array(
-                [[Q, self.b[:, None]], [self.c[None], None]], format="csc"
-            )
-            self.forward = factor(sparse.csc_array(whole))
-            self.backward = factor(sparse.csc_array(whole.T))
-            e = np.zeros(n + 1)
-            e[n] = 1.0
-            c, b = self.forward.solve(e)[:n], self.backward.solve(e)[:n]
-
-    def solve(self, b: Array, *, transposed: bool) -> Array:
-        return (self.backward if transposed else self.forward).solve(b)
-
-
-def _iterate(
-    solver: Any, by_l: Any, by_p: Any, by_p_transposed: Any, l: float, p: float
+def _by_pair(
+    state: SlidingState, l: float, p: float, right: Array, left: Array
 ) -> tuple[float, float] | None:
-    """Newton's method for g = 0, dg/dl = 0; by_l, by_p: products with derivatives of Q."""
-    size = np.inf
-    for _ in range(STEPS):
+    """(l, p) where the pair of modes with motions right, left (n, 2) meets, nearly."""
+    M, slope = state.wide(state.M), state.by_friction
+    zero = np.zeros((state.B.shape[0], 2))
+    X, Y = np.vstack([right, zero]), np.vstack([left, zero])
+    for _ in range(FOLLOWED):
+        Q = sparse.csc_array(state.stiffness(p) - l * M)
         try:
-            system = solver(l, p)
+            ahead, back = factor(Q).solve, factor(sparse.csc_array(Q.T)).solve
+            for _ in range(2):
+                X = np.linalg.qr(np.asarray(ahead(M @ X)))[0]
+                Y = np.linalg.qr(np.asarray(back(M.T @ Y)))[0]
+            T, S = (np.linalg.solve(Y.T @ (M @ X), Y.T @ (A @ X)) for A in (Q, slope))
         except (SingularOperator, np.linalg.LinAlgError):
+            return l, p  # an eigenvalue: Newton's method tells which
+        dp = _to_meet(T, S)
+        if not np.isfinite(dp):
             return None
-        n = len(system.b)
-        e = np.zeros(n + 1)
-        e[n] = 1.0
-        x, y = system.solve(e, transposed=False), system.solve(e, transposed=True)
-        g, x, y = x[n], x[:n], y[:n]
-
-        def shifted(of: Any, vector: Array, *, transposed: bool, system: Any = system) -> Array:
-            right = np.append(-of(vector), 0.0)
-            return system.solve(right, transposed=transposed)[: len(vector)]
-
-        x_l, y_l = shifted(by_l, x, transposed=False), shifted(by_l, y, transposed=True)
-        x_p, y_p = shifted(by_p, x, transposed=False), shifted(
-            by_p_transposed, y, transposed=True
-        )
-        g_l, g_p = -y @ by_l(x), -y @ by_p(x)
-        g_ll = -(y_l @ by_l(x) + y @ by_l(x_l))
-        g_lp = -(y_p @ by_l(x) + y @ by_l(x_p))
-        J = np.array([[g_l, g_p], [g_ll, g_lp]])
-        scale = np.array([max(abs(l), 1e-300), max(abs(p), 1e-300)])
-        try:
-            step = -np.linalg.solve(J * scale, np.array([g, g_l]))
-        except np.linalg.LinAlgError:
-            return None
-        size = float(np.abs(step).max())
-        if not np.isfinite(size):
-            return None
-        step *= min(1.0, 0.3 / size) if size > 0 else 1.0
-        l, p = l * (1 + step[0]), p * (1 + step[1])
-        if size <= DONE:
-            break
-    else:
-        if size > 1e-8:  # rounding ends it before DONE
-            return None
-    return (l, p) if l > 0 and p > 0 else None
+        dp = float(np.clip(dp, -LONGEST * p, LONGEST * p))
+        dl = float(np.trace(T + dp * S)) / 2
+        if abs(dl) > LONGEST * l:
+            dp, dl = dp * LONGEST * l / abs(dl), np.copysign(LONGEST * l, dl)
+        l, p = l + float(dl), p + dp
+        if abs(dp) <= CLOSE * p and abs(dl) <= CLOSE * l:
+            return l, p
+    return None
 
 
-def _begins(state: SlidingState, l: float, p: float) -> bool:
-    """Whether a mode near sqrt(l) grows beyond p and does not before."""
-    near = float(np.sqrt(l) / (2 * np.pi))
-    grows = []
-    for share in (1 - CHECKED, 1 + CHECKED):
-        q = p * share
-        there = replace(state, F_1=sparse.csc_array(q * state.F_1), mu=q * state.mu)
-        modes = modes_of(there, 4, near)
-        close = np.abs(modes.frequency - near) <= 0.2 * near
-        grows.append(int((modes.s.real[close] > 1e-6 * np.abs(modes.s[close])).sum()))
-    return grows[1] > grows[0]
+def _to_meet(T: Array, S: Array) -> float:
+    """The smallest step x at which T + x S, two by two, has a double eigenvalue; nan: none."""
+    T, S = (A - 0.5 * np.trace(A) * np.eye(2) for A in (T, S))
+    mixed = T[0, 0] * S[1, 1] + T[1, 1] * S[0, 0] - T[0, 1] * S[1, 0] - T[1, 0] * S[0, 1]
+    found = np.roots([np.linalg.det(S), mixed, np.linalg.det(T)])
+    return float(found[np.argmin(np.abs(found))].real) if len(found) else float("nan")

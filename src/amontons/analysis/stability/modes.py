@@ -26,7 +26,7 @@ from .sliding import SlidingState, factor
 
 if TYPE_CHECKING:
     from ...mechanics.model import Model
-    from .coalescence import Flutter
+    from .coalescence import FlutterPoints
 
 Array = NDArray[np.float64]
 Complex = NDArray[np.complex128]
@@ -81,11 +81,12 @@ class Modes(Shown):
         ]
         return tuple(a + 1j * b for a, b in zip(*parts_of, strict=True))
 
-    def flutter(self, most: int = 3) -> tuple[Flutter, ...]:
+    def flutter(self, most: int = 3) -> FlutterPoints:
         """Frictions at which two modes meet and begin to grow, ascending; see `coalescence`.
 
         Statuses are those of this state, whatever the friction; where contacts would open or
-        stick before, ask again at that friction.  Damping is left out.
+        stick before, ask again at that friction.  Damping is left out.  `warnings` of the
+        tuple name points that seem to be there and were not found.
         """
         from .coalescence import flutter_points
 

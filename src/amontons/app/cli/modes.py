@@ -34,13 +34,16 @@ def run(  # noqa: PLR0913
         click.echo(f"{opened.title}\n{found}")
         for point in points or ():
             click.echo(f"flutter from friction {point.mu:.7g} on, at {point.frequency:.7g}")
-        if points == ():
+        for doubt in () if points is None else points.warnings:
+            click.echo(str(doubt))
+        if points == () and not points.warnings:
             click.echo("no flutter at any friction was found")
     if json_copy is not None:
         record = {"schema": SCHEMA, "title": opened.title, **found.record}
         record["flutter"] = None if points is None else [
             {"friction": p.mu, "frequency": p.frequency} for p in points
         ]  # fmt: skip
+        record["warnings"] = [] if points is None else [w.record for w in points.warnings]
         deliver_json(to_json({**record, "versions": versions()}), json_copy)
     if picture is not None:
         found.plot(picture, title=opened.title)
