@@ -37,7 +37,8 @@ class Region:
 
     helpers: threads that may help at most, each in a seat of its own; taken: who has a part,
     of which `setdefault` is one step that nothing comes between; ended: the error of a part
-    that has been done, or None; bells: locks that ring then; closed: no part is being done, nor will be.
+    that has been done, or None; bells: locks that ring then; closed: no part is
+    being done, nor will be.
     """
 
     def __init__(
