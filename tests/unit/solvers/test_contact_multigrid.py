@@ -220,6 +220,14 @@ def test_nesting_and_acceleration_save_cycles():
     assert cycles["full"] < cycles["plain"] <= 30
 
 
+def test_an_old_tangent_is_renewed_where_it_slows_the_cycles(monkeypatch):
+    """However few states have changed since, and however little the error has fallen."""
+    monkeypatch.setattr("amontons.solvers.multigrid.cycles.FEW", 1.0)
+    solver = ContactMultigrid(nested=False, update_ratio=1e-12)
+    solution = drive(cube(8).assemble(), solver, tolerance=1e-8)
+    assert solution.convergence.iterations <= 20  # 60 with the first tangent
+
+
 def test_a_start_near_the_solution_is_used():
     problem = cube(4).assemble()
     first = drive(problem, ContactMultigrid(), tolerance=1e-6)

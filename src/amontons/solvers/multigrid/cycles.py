@@ -11,8 +11,8 @@ One cycle, from v on the finest level:
 3. coarse correction: one linear V(1,1) cycle, with two on the second coarse level, on levels
    that see these states, a Galerkin tangent whose test and trial spaces are truncated to the
    directions in which the contacts can move (`truncation`).  It is renewed when more than FEW
-   states change or the error has fallen far.  Slip ends where it would turn round
-   (`ContactNodes.limit`).
+   states change, or any while the error falls little (STALE), or when it has fallen far.
+   Slip ends where it would turn round (`ContactNodes.limit`).
 4. smooth in reverse order.
 
 Residuals say little of what moves slowly in soft parts between stiff ones: after LATE cycles
@@ -74,6 +74,7 @@ LATE = 30  # cycles after which steps are mixed: residuals hide slow errors in s
 LONG = 24  # steps to mix then
 FEW = 0.01  # share of the closed contacts up to which changed states leave the tangent as it is
 GRID_DEPTH = 2  # past cycles to mix at most where M is not stored
+STALE = 0.5  # fall of the error in a cycle above which any changed state renews the tangent
 SLOW = 0.8  # fall of the error in a cycle above which, while states change, steps are limited
 CLOSE = 0.99  # share of the error that should do at which an iterate is handed out
 
@@ -231,9 +232,10 @@ class _Run:
             if patience.over(error):
                 raise Breakdown("contact multigrid: the cycles have stalled")
             careful = unsettled and error > SLOW * last
+            stale = self.changed() > 0 and error > STALE * last
             last = error
             fallen = error < self.options.update_ratio * at_update
-            if not self.few_changed() or careful or self.frozen or fallen:
+            if not self.few_changed() or stale or self.frozen or fallen:
                 self.renew(careful)
                 at_update = error
             (self.correct_carefully if careful else self.correct)(x)
