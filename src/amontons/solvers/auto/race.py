@@ -151,15 +151,18 @@ class Track:
     promise: float = math.inf  # nanoseconds to the goal at its rate
     foreseen: float = math.inf  # the least cost at which it has promised the goal
 
-    def advance(self) -> Chunk | None:
-        """A chunk, its reaction taken by the state; None where the method has ended."""
+    def advance(self, growth: float = GROWTH) -> Chunk | None:
+        """A chunk, its reaction taken by the state; None where the method has ended.
+
+        growth: its cost at least, of what the track has cost.
+        """
         if self.chunks is None:
             self.chunks = self.entry.chunks(self.state)
             next(self.chunks)
             self.errors.append(self.state.first_error)
             self.path.append((0.0, self.state.first_error))
         try:
-            turn = Turn(max(GROWTH * self.cost, SHORTEST), self.errors[-1])
+            turn = Turn(max(growth * self.cost, SHORTEST), self.errors[-1])
             chunk = self.chunks.send(turn)
         except (StopIteration, Breakdown, SingularOperator):
             return None
@@ -342,7 +345,8 @@ class Race:
 
     def _go_on(self, track: Track) -> Iterates:
         """A chunk of a track, which leaves where it has ended."""
-        before, chunk = track.cost, track.advance()
+        growth = 0.0 if self.shows_all else GROWTH  # ended by how often the driver looks
+        before, chunk = track.cost, track.advance(growth)
         if chunk is None:
             self.tracks.remove(track)
             return
