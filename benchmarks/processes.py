@@ -98,18 +98,18 @@ def together(kind, cells, tolerance):
 def measured(kind, cells, processes, given):
     """A row: what one run has used; processes: None for one without PETSc."""
     load = os.getloadavg()[0]
-    mine = [sys.executable, __file__, "--worker", kind, str(cells)]
-    mine += ["--tolerance", str(given.tolerance), "--megabytes", str(given.megabytes)]
     with tempfile.TemporaryDirectory() as folder:
-        log = Path(folder) / "log"
+        log, answer = Path(folder) / "log", Path(folder) / "answer"
+        mine = [sys.executable, __file__, "--worker", kind, str(cells), str(answer)]
+        mine += ["--tolerance", str(given.tolerance), "--megabytes", str(given.megabytes)]
         env = {**os.environ, **MPI, "PETSC_OPTIONS": f"-log_view :{log}"}
         command = [*mine, "--alone"] if processes is None else [
             "mpirun", "--oversubscribe", "-n", str(processes), *mine]  # fmt: skip
         done = subprocess.run(command, env=env, capture_output=True, text=True,
                               timeout=given.seconds)  # fmt: skip
-        if done.returncode:
-            raise RuntimeError(done.stderr)
-        found = json.loads(done.stdout.strip().splitlines()[-1])
+        if done.returncode or not answer.exists():
+            raise RuntimeError(done.stdout + done.stderr)
+        found = json.loads(answer.read_text())  # mpirun and PETSc print what they like
         text = log.read_text() if log.exists() else ""
     names = ("MPI Msg Count", "MPI Msg Len \\(bytes\\)", "MPI Reductions")
     numbers = [re.search(rf"^{name}:\s+(\S+)", text, re.MULTILINE) for name in names]
@@ -142,7 +142,7 @@ def main():
     parser.add_argument("--seconds", type=float, default=3600.0)
     parser.add_argument("--megabytes", type=int, default=16_000, help="of one process")
     parser.add_argument("--resume", action="store_true")
-    parser.add_argument("--worker", nargs=2)
+    parser.add_argument("--worker", nargs=3, metavar=("KIND", "CELLS", "ANSWER"))
     parser.add_argument("--alone", action="store_true")
     given = parser.parse_args()
     if given.worker:
@@ -151,7 +151,7 @@ def main():
         resource.setrlimit(resource.RLIMIT_DATA, (most, most))
         found = (alone if given.alone else together)(kind, cells, given.tolerance)
         if found is not None:
-            print(json.dumps(found))
+            Path(given.worker[2]).write_text(json.dumps(found))
         return
     known = kept_rows() if given.resume else {}
     for kind in given.kinds:
