@@ -7,7 +7,8 @@ One cycle, from v on the finest level:
    have been swept again.  In one-sided bases these couple strongly with the contacts, and so
    does the master side: without that sweep cycles doubled with every refinement.
 2. mix: of this point and the last ones, the one with the least residual (`least_residual`);
-   contacts solve again, and states, reactions and residual are of this v.
+   contacts solve again unless none has changed its state, and states, reactions and residual
+   are of this v.
 3. coarse correction: one linear V(1,1) cycle, with two on the second coarse level, on levels
    that see these states, a Galerkin tangent whose test and trial spaces are truncated to the
    directions in which the contacts can move (`truncation`).  It is renewed when more than FEW
@@ -194,6 +195,7 @@ class _Run:
         tangent.begin(k, self.contacts)
         self.parts = self.contacts.tangent()  # V, W, L at the present states
         self.states = np.full_like(self.contacts.state, -2)  # of the tangent
+        self.before = self.states  # of the last cycle
         self.frozen = False  # are the bounds of friction, in the tangent?
         self.updates = 0
         self.goal = 0.0  # error that will do
@@ -264,13 +266,19 @@ class _Run:
 
         It stays as it was where its error would grow, and the memory begins anew.  The rows of
         contacts in the residual that is made small are those of the tangent (`combine`).
+        Contacts solve again only where a state has changed since the last cycle: what sticks or
+        is open does so in all points alike, and slip turns little.
         """
         contacts, node, r = self.contacts, self.contacts.node, self.r
         raw, before, state = r[node], x[node], contacts.state.copy()
+        settled = bool((state == self.before).all())
         contacts.combine(self.parts[1], r)
         if mixing.mix(x.reshape(-1), r.reshape(-1)):
-            contacts.sweep(self.f, x)
-            contacts.residual(self.f, x, r)
+            if settled:
+                contacts.own_residual(self.f, x, r)
+            else:
+                contacts.sweep(self.f, x)
+                contacts.residual(self.f, x, r)
             mixed = self.error(x)
             if mixed <= error:
                 error, self.parts = mixed, contacts.tangent()
@@ -283,7 +291,7 @@ class _Run:
             raw = r[node]
             contacts.combine(self.parts[1], r)
         mixing.keep(x.reshape(-1), r.reshape(-1))
-        r[node] = raw
+        r[node], self.before = raw, state
         return error
 
     def error(self, x: Array) -> float:
