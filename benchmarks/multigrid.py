@@ -1,7 +1,7 @@
 """Contact multigrid on the problems of hueeber2008, against one linear elasticity solve.
 
     python benchmarks/multigrid.py [--levels 3,4,5,6,7] [--repeats 3] [--only mortar,shell]
-    python benchmarks/multigrid.py --only unstructured [--sizes 0.036,0.024,0.0158]
+    python benchmarks/multigrid.py --only unstructured [--sizes 0.036,0.024,0.0128]
 
 Linear solve: the same bodies with their contact faces clamped, conjugate gradients with one
 V(1,1) cycle of `GeometricMultigrid`, zero start, to the same relative residual.  Contact: the
@@ -11,7 +11,9 @@ prepared before on both sides; compiled code is warm.  Both sides use the same e
 blocks and block Gauss-Seidel, from 50 000 dofs on no matrix and Chebyshev smoothing.  CPU
 seconds of one thread, best of the repeats.  Two bodies are judged by their residual: forming W
 for the judge would take many times as long as the solve.  Unstructured: the cube in tetrahedra
-of gmsh (not installed by default), with set-up: what depends on the matrices alone.
+of gmsh (not installed by default), with set-up: what depends on the matrices alone.  What is
+aimed at: `ratio` at most 1.1 on cubes of levels 5 to 7 and 1.5 on the shell; on tetrahedra at
+most 1.3 in the last column, set-up counted on both sides.
 Pairs and kinds (`multigrid_models`): one run each, whose times to 1e-8 are first ones with all
 preparation in them, so look at cycles.
 
@@ -367,7 +369,7 @@ def main():
     parser.add_argument("--levels", default="1,2,3,4,5,6,7")
     parser.add_argument("--repeats", type=int, default=3)
     parser.add_argument("--friction-level", type=int, default=5)
-    parser.add_argument("--sizes", default="0.036,0.024", help="edges of tetrahedra")
+    parser.add_argument("--sizes", default="0.036,0.024,0.0128", help="edges of tetrahedra")
     parser.add_argument("--only", help="parts to measure again, with commas")
     given = parser.parse_args()
     levels = [int(x) for x in given.levels.split(",")]

@@ -16,7 +16,9 @@ from amontons.problem.friction import FrictionProblem
 from amontons.problem.solution import Outcome
 from amontons.solvers import ContactMultigrid, SemismoothNewton
 from amontons.solvers.driver import drive
+from amontons.solvers.multigrid import cycles
 from amontons.solvers.multigrid.levels import ContactLevels
+from amontons.solvers.multigrid.nodes import ContactNodes
 
 REFERENCE = json.loads((Path(__file__).parents[2] / "data/cube.json").read_text())
 
@@ -226,6 +228,22 @@ def test_an_old_tangent_is_renewed_where_it_slows_the_cycles(monkeypatch):
     solver = ContactMultigrid(nested=False, update_ratio=1e-12)
     solution = drive(cube(8).assemble(), solver, tolerance=1e-8)
     assert solution.convergence.iterations <= 20  # 60 with the first tangent
+
+
+def test_contacts_solve_once_where_the_rows_they_touch_hold_little_residual(monkeypatch):
+    problem = two_bodies("mortar").assemble()
+    sweep, solved = ContactNodes.sweep, []
+
+    def counted(self, *arguments):
+        solved[-1] += len(self.node)
+        sweep(self, *arguments)
+
+    monkeypatch.setattr(ContactNodes, "sweep", counted)
+    for little in (0.0, cycles.LITTLE, np.inf):
+        monkeypatch.setattr(cycles, "LITTLE", little)
+        solved.append(0)
+        assert drive(problem, ContactMultigrid()).convergence.iterations <= 11
+    assert solved[0] > solved[1] > solved[2]
 
 
 def test_a_start_near_the_solution_is_used():

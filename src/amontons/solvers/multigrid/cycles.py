@@ -5,9 +5,11 @@ One cycle, from v on the finest level:
 1. smooth: block Gauss-Seidel in the bulk, then every contact node solves its own problem of
    contact and friction exactly (`nodes`), once before and once after the nodes that it touches
    have been swept again.  In one-sided bases these couple strongly with the contacts, and so
-   does the master side: without that sweep cycles doubled with every refinement.
+   does the master side: without that sweep cycles doubled with every refinement.  Where their
+   rows hold LITTLE of the residual, the first of the two solves is left out.
 2. mix: of this point and the last ones, the one with the least residual (`least_residual`);
-   contacts solve again, and states, reactions and residual are of this v.
+   contacts solve again unless none has changed its state, and states, reactions and residual
+   are of this v.
 3. coarse correction: one linear V(1,1) cycle, with two on the second coarse level, on levels
    that see these states, a Galerkin tangent whose test and trial spaces are truncated to the
    directions in which the contacts can move (`truncation`).  It is renewed when more than FEW
@@ -76,6 +78,7 @@ FEW = 0.01  # share of the closed contacts up to which changed states leave the 
 GRID_DEPTH = 2  # past cycles to mix at most where M is not stored
 STALE = 0.5  # fall of the error in a cycle above which any changed state renews the tangent
 SLOW = 0.8  # fall of the error in a cycle above which, while states change, steps are limited
+LITTLE = 0.25  # share of |residual| in the rows that contacts touch: below it these solve once
 CLOSE = 0.99  # share of the error that should do at which an iterate is handed out
 
 
@@ -194,6 +197,8 @@ class _Run:
         tangent.begin(k, self.contacts)
         self.parts = self.contacts.tangent()  # V, W, L at the present states
         self.states = np.full_like(self.contacts.state, -2)  # of the tangent
+        self.before = self.states  # of the last cycle
+        self.calm = False  # is there little residual where contacts touch the bulk?
         self.frozen = False  # are the bounds of friction, in the tangent?
         self.updates = 0
         self.goal = 0.0  # error that will do
@@ -216,7 +221,7 @@ class _Run:
                 copy_into(x, before)
             self.smooth(x, backward=False)
             for _ in range(self.options.contact_sweeps):
-                self.contacts.relax(self.f, x, self.held, backward=False)
+                self.contacts.relax(self.f, x, self.held, backward=False, once=self.calm)
             self.level.A.residual(x, self.f, self.r)
             error = self.error(x)
             self.parts = self.contacts.tangent()
@@ -239,7 +244,7 @@ class _Run:
                 self.renew(careful)
                 at_update = error
             (self.correct_carefully if careful else self.correct)(x)
-            self.contacts.relax(self.f, x, self.held, backward=True)
+            self.contacts.relax(self.f, x, self.held, backward=True, once=self.calm)
             self.smooth(x, backward=True)
             if long is not None:
                 if unsettled:
@@ -264,13 +269,19 @@ class _Run:
 
         It stays as it was where its error would grow, and the memory begins anew.  The rows of
         contacts in the residual that is made small are those of the tangent (`combine`).
+        Contacts solve again only where a state has changed since the last cycle: what sticks or
+        is open does so in all points alike, and slip turns little.
         """
         contacts, node, r = self.contacts, self.contacts.node, self.r
         raw, before, state = r[node], x[node], contacts.state.copy()
+        settled = bool((state == self.before).all())
         contacts.combine(self.parts[1], r)
         if mixing.mix(x.reshape(-1), r.reshape(-1)):
-            contacts.sweep(self.f, x)
-            contacts.residual(self.f, x, r)
+            if settled:
+                contacts.own_residual(self.f, x, r)
+            else:
+                contacts.sweep(self.f, x)
+                contacts.residual(self.f, x, r)
             mixed = self.error(x)
             if mixed <= error:
                 error, self.parts = mixed, contacts.tangent()
@@ -283,7 +294,7 @@ class _Run:
             raw = r[node]
             contacts.combine(self.parts[1], r)
         mixing.keep(x.reshape(-1), r.reshape(-1))
-        r[node] = raw
+        r[node], self.before = raw, state
         return error
 
     def error(self, x: Array) -> float:
@@ -292,6 +303,7 @@ class _Run:
         kept = self.r[self.contacts.node]
         self.r[self.contacts.node] = 0.0
         balance = norm(self.r)
+        self.calm = norm(self.r[self.contacts.near.node]) < LITTLE * balance
         self.r[self.contacts.node] = kept
         return max(balance / self.load, law / self.length)
 

@@ -140,14 +140,18 @@ class ContactNodes:
             self.state, backward, backward=backward,
         )  # fmt: skip
 
-    def relax(self, f: Array, x: Array, held: NDArray[np.bool_], backward: bool) -> None:
+    def relax(
+        self, f: Array, x: Array, held: NDArray[np.bool_], backward: bool, once: bool = False
+    ) -> None:
         """`sweep`, a sweep over the nodes that contacts touch, and `sweep` again.
 
         held (nodes,): the contact nodes.  What the first sweep leaves there would be all that
         the next level sees of the bulk: most of the residual where such rows are strongly
         coupled, as those of the nodes of a master surface are in the one-sided basis.
+        once: without the first sweep.
         """
-        self.sweep(f, x, backward)
+        if not once:
+            self.sweep(f, x, backward)
         self.near.smooth(f, x, held, backward)
         self.sweep(f, x, backward)
 

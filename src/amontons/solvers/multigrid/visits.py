@@ -6,7 +6,7 @@ import numpy as np
 from numba import uint64
 
 from ...core.compiled import njit
-from ...linear.node_blocks import row_product
+from ...linear.node_blocks import row_product, row_product_back
 from ...problem.law.law import BOUND, TRESCA
 from ...problem.law.single import solve_contact
 from ...problem.law.states import OPEN, SLIP, STICK
@@ -22,7 +22,11 @@ def sweep_contacts(begin, end, indptr, indices, data, node, H, inverse, complian
     for step in range(end - begin):
         c = end - 1 - step if backward else begin + step
         p = node[c]
-        s0, s1, s2 = row_product(indices, data, x, uint64(indptr[c]), uint64(indptr[c + 1]))
+        first, last = uint64(indptr[c]), uint64(indptr[c + 1])
+        if backward:
+            s0, s1, s2 = row_product_back(indices, data, x, first, last)
+        else:
+            s0, s1, s2 = row_product(indices, data, x, first, last)
         g0, g1, g2 = f[p, 0] - s0, f[p, 1] - s1, f[p, 2] - s2
         for i in range(3):
             y[i] = x[p, i] + (
