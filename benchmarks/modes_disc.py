@@ -16,39 +16,15 @@ SPEEDS = (10.0, 100.0)  # rad/s
 MESHES = (1, 2)  # cells along radius and circumference, in parts of the coarse ones
 
 
-def ring(radii: Array, angles: Array, heights: Array) -> am.Mesh:
-    """Hexahedra in polar coordinates; closed where the angles go once around."""
-    closed = np.isclose(angles[-1] - angles[0], 2 * np.pi)
-    turns = angles[:-1] if closed else angles
-    r, a, z = np.meshgrid(radii, turns, heights, indexing="ij")
-    points = np.column_stack([(r * np.cos(a)).ravel(), (r * np.sin(a)).ravel(), z.ravel()])
-    number = np.arange(len(points)).reshape(r.shape)
-    far = np.roll(number, -1, axis=1) if closed else number[:, 1:]
-    near = number if closed else number[:, :-1]
-    low = [near[:-1, :, :-1], near[1:, :, :-1], far[1:, :, :-1], far[:-1, :, :-1]]
-    high = [near[:-1, :, 1:], near[1:, :, 1:], far[1:, :, 1:], far[:-1, :, 1:]]
-    cells = np.stack([corner.ravel() for corner in low + high], axis=1)
-    faces = {
-        "bottom": [corner[:, :, 0] for corner in low],
-        "top": [corner[:, :, -1] for corner in high],
-        "inner": [near[0, :, :-1], near[0, :, 1:], far[0, :, 1:], far[0, :, :-1]],
-    }
-    surfaces = {
-        name: (am.Facets("quad", np.stack([corner.ravel() for corner in corners], axis=1)),)
-        for name, corners in faces.items()
-    }
-    return am.Mesh(points, (am.Cells("hex", cells),), surfaces)
-
-
 def model_of(fine: int) -> am.Model:
     """6 x 36 x 2 cells of the disc and 2 x 6 x 2 of a pad, times fine each way along it."""
     radii = np.linspace(0.04, 0.15, 6 * fine + 1)
     angles = np.linspace(0, 2 * np.pi, 36 * fine + 1)
     inner, outer = 3 * fine, 5 * fine + 1
     first, last = 6 * fine, 12 * fine + 1
-    disc = ring(radii, angles, np.linspace(-0.01, 0.01, 3))
-    upper = ring(radii[inner:outer], angles[first:last], np.linspace(0.01, 0.025, 3))
-    lower = ring(radii[inner:outer], angles[first:last], np.linspace(-0.025, -0.01, 3))
+    disc = am.ring(radii, angles, np.linspace(-0.01, 0.01, 3))
+    upper = am.ring(radii[inner:outer], angles[first:last], np.linspace(0.01, 0.025, 3))
+    lower = am.ring(radii[inner:outer], angles[first:last], np.linspace(-0.025, -0.01, 3))
     return am.Model(
         [am.Body(disc, STEEL, "disc"), am.Body(upper, STEEL, "upper"),
          am.Body(lower, STEEL, "lower")],

@@ -29,7 +29,7 @@ GROUPS = {
     ),
     "Meshes": (
         "Meshes that are built in, read from files, or made from shapes.",
-        "Mesh Cells Facets box mesh_shape read_mesh read_cad refined",
+        "Mesh Cells Facets box ring mesh_shape read_mesh read_cad refined",
     ),
     "Friction laws": (
         "Laws of contact as values, one for all contacts or one each.",

@@ -80,7 +80,7 @@ _HOME = {
                  "ThetaMethod", "Uniqueness", "Verdict", "Witness", "graded",
                  "performance_profile"),
     "mechanics.meshes": ("Cells", "Facets", "Mesh", "box", "mesh_shape", "opened",
-                         "read_cad", "refined"),
+                         "read_cad", "refined", "ring"),
     "io.matrices": ("StoredMatrices", "read_matrices"),
     "io.meshes": ("read_mesh",),
     "mechanics.contact": ("Cylinder", "Extrusion", "LevelSet", "Nitsche", "Plane", "Profile",

@@ -80,7 +80,7 @@ from .mechanics.contact import (
 )
 from .mechanics.meshes import (
     Cells as Cells, Facets as Facets, Mesh as Mesh, box as box, mesh_shape as mesh_shape,
-    opened as opened, read_cad as read_cad, refined as refined,
+    opened as opened, read_cad as read_cad, refined as refined, ring as ring,
 )
 from .mechanics.model import (
     Axes as Axes, Body as Body, BodyForce as BodyForce, CiarletGeymonat as CiarletGeymonat,

@@ -16,36 +16,10 @@ import numpy as np
 import amontons as am
 
 STEEL = am.LinearElastic(200e9, 0.3, density=7850)  # N, m, kg, s
-
-
-def ring(radii, angles, heights):
-    """A mesh of hexahedra in polar coordinates; closed where the angles go once around."""
-    closed = np.isclose(angles[-1] - angles[0], 2 * np.pi)
-    turns = angles[:-1] if closed else angles
-    r, a, z = np.meshgrid(radii, turns, heights, indexing="ij")
-    points = np.column_stack([(r * np.cos(a)).ravel(), (r * np.sin(a)).ravel(), z.ravel()])
-    number = np.arange(len(points)).reshape(r.shape)
-    far = np.roll(number, -1, axis=1) if closed else number[:, 1:]
-    near = number if closed else number[:, :-1]
-    low = [near[:-1, :, :-1], near[1:, :, :-1], far[1:, :, :-1], far[:-1, :, :-1]]
-    high = [near[:-1, :, 1:], near[1:, :, 1:], far[1:, :, 1:], far[:-1, :, 1:]]
-    cells = np.stack([corner.ravel() for corner in low + high], axis=1)
-    faces = {
-        "bottom": [corner[:, :, 0] for corner in low],
-        "top": [corner[:, :, -1] for corner in high],
-        "inner": [near[0, :, :-1], near[0, :, 1:], far[0, :, 1:], far[0, :, :-1]],
-    }
-    surfaces = {
-        name: (am.Facets("quad", np.stack([corner.ravel() for corner in corners], axis=1)),)
-        for name, corners in faces.items()
-    }
-    return am.Mesh(points, (am.Cells("hex", cells),), surfaces)
-
-
 radii, angles = np.linspace(0.04, 0.15, 7), np.linspace(0, 2 * np.pi, 37)
-disc = ring(radii, angles, [-0.01, 0, 0.01])
-upper = ring(radii[3:6], angles[6:13], [0.01, 0.0175, 0.025])
-lower = ring(radii[3:6], angles[6:13], [-0.025, -0.0175, -0.01])
+disc = am.ring(radii, angles, [-0.01, 0, 0.01])
+upper = am.ring(radii[3:6], angles[6:13], [0.01, 0.0175, 0.025])
+lower = am.ring(radii[3:6], angles[6:13], [-0.025, -0.0175, -0.01])
 model = am.Model(
     [am.Body(disc, STEEL, "disc"), am.Body(upper, STEEL, "upper"), am.Body(lower, STEEL, "lower")],
     [am.Fix("disc.inner", 0), am.Fix("upper.top", (0, 0, -2e-6)),

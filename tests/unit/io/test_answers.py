@@ -51,6 +51,15 @@ def test_broken_results_are_refused_with_their_place(tmp_path):
             am.audit(deck, path)
 
 
+def test_displacements_along_local_axes_are_not_taken_for_global_ones(tmp_path):
+    """CalculiX prints nodes of a *TRANSFORM so, with an L behind them, unless GLOBAL=YES."""
+    path = tmp_path / "turned.dat"
+    path.write_text(" displacements (vx,vy,vz) for set ALL and time  0.1000000E+01\n\n"
+                    "         1  5.000000E-02  1.000000E-02  0.000000E+00 L\n")  # fmt: skip
+    with pytest.raises(FileFormatError, match="line 3: node 1 is printed along.*GLOBAL=YES"):
+        am.audit(SHARED / "block_good.inp", path)
+
+
 def test_a_folder_without_a_solution_is_told_from_a_file(tmp_path):
     with pytest.raises(FileFormatError, match="a folder with solution.h5 in it"):
         am.audit(am.read_case("example:hild").model, tmp_path)

@@ -175,6 +175,11 @@ def cube():
     return am.solve(model)
 
 
+def test_displacements_are_not_drawn_smaller_than_they_are(cube, tmp_path, opened):
+    page = opened(cube.report(tmp_path / "r.html"))  # a fifth of the edge: figures have x 1
+    assert page.evaluate("window.report.view.suggested()") == 1
+
+
 def test_a_picked_node_tells_its_numbers(cube, tmp_path, opened):
     page = opened(cube.report(tmp_path / "r.html", units="mm,N"))
     most = int(np.argmax(cube.pressure))

@@ -184,6 +184,17 @@ def test_facets_behind_a_curved_surface_are_told_of(shaft, hub):
     assert wrong / mean - 1 == pytest.approx(share, rel=0.25)  # as much as is said
 
 
+def test_flat_facets_lie_behind_nothing():
+    """Their slopes are rounding: the blocks of the wall's example were told of 7.7e-34."""
+    low = am.box((0.4, 0.2, 0.2), (4, 2, 2), origin=(0.1, 0, 0.4))
+    high = am.box((0.4, 0.2, 0.2), (4, 2, 2), origin=(0.3, 0, 0.6))
+    for angle in (0.0, 0.2, 0.5):  # off the axes
+        cos, sin = np.cos(angle), np.sin(angle)
+        turn = np.array([[cos, 0, -sin], [0, 1, 0], [sin, 0, cos]])
+        one, two = (am.Mesh(m.points @ turn, m.cells, m.surfaces) for m in (high, low))
+        assert not mismatch(one, "bottom", two, "top").behind.any()
+
+
 def test_nitsche_sees_curved_surfaces_too():
     solution = am.solve(press_fit((2, 13, 3), (3, 9, 2), "nitsche"))
     mean = (solution.pressure * solution.weights).sum() / solution.weights.sum()

@@ -57,6 +57,11 @@ def digits_of(path: Path) -> int:
 
 def _row(path: Path, at: int, line: str) -> tuple[int, list[float]]:
     words = line.split()
+    if words[4:] == ["L"]:
+        raise FileFormatError(
+            f"{path}: line {at + 1}: node {words[0]} is printed along the local axes of its "
+            "*TRANSFORM; ask for *NODE PRINT, GLOBAL=YES, or take the .frd"
+        )
     try:
         label, values = int(words[0]), [float(word) for word in words[1:]]
     except ValueError:

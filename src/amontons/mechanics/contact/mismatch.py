@@ -23,6 +23,7 @@ from .segments import Surface, bulge, in_front
 
 Array = NDArray[np.float64]
 COUNTS = 1e-9  # shape functions below this do not count
+ROUNDING = 1e-14  # of the coordinates: a surface that rises less above its facets is flat
 FEWEST = 1  # points per direction: as many as the integrals of shape functions need
 
 
@@ -45,6 +46,7 @@ def mismatch(slave: Mesh, surface: str, master: Mesh, master_surface: str) -> Mi
     over = Surface.on(slave, surface)
     under = Surface.on(master, master_surface)
     behind = np.linalg.norm(bulge(under, hit.facet, hit.shape), axis=1) * hit.found
+    behind[behind <= ROUNDING * np.abs(under.points).max()] = 0.0
     met = in_front(over, under, master, joined=slave is master)
     if not len(met.slave):
         return Mismatch(np.zeros(len(nodes)), behind)

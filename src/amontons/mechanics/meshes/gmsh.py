@@ -181,7 +181,8 @@ Elements = list[tuple[str, Index, list[int]]]  # kind, node tags (k, nodes), phy
 
 def _kind(lines: Lines, code: int) -> tuple[str, int]:
     if code not in KINDS:
-        raise lines.error(f"an element type among {', '.join(map(str, KINDS))}", str(code))
+        kinds = ", ".join(map(str, KINDS))
+        raise lines.error(f"an element type of first or second order, among {kinds}", str(code))
     return KINDS[code]
 
 

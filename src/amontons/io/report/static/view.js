@@ -45,12 +45,15 @@ class View {
     for (const range of Object.values(this.ranges)) if (range[1] - range[0] <= 0) range[1] = range[0] + 1;
   }
 
-  /** A round factor that makes the largest displacement visible; 1 where it is. */
+  /** A round factor that makes the largest displacement visible; 1 where it is.  Not below 1, which hides
+      how large strains are, unless the bodies go out of sight: as in figures. */
   suggested() {
-    if (!(this.largest.moved > 1e-12 * this.view.size)) return 1;
-    const wanted = (0.12 * this.view.size) / this.largest.moved;
+    const { moved } = this.largest, { size } = this.view;
+    if (!(moved > 1e-12 * size)) return 1;
+    const wanted = (0.12 * size) / moved;
     const power = 10 ** Math.floor(Math.log10(wanted));
-    return power * [5, 2, 1].find((k) => k * power <= wanted * (1 + 1e-9));
+    const round = power * [5, 2, 1].find((k) => k * power <= wanted * (1 + 1e-9));
+    return moved > size ? round : Math.max(1, round);
   }
 
   // ------------------------------------------------------------------------------ panes
