@@ -238,3 +238,21 @@ def test_a_cube_dragged_over_a_slab():
     force = np.einsum("pkc,pk->pc", steps[-1].frames, r).sum(axis=0)
     assert abs(force[1]) < 1e-8 * force[2]
     assert force[0] < -0.25 * force[2]
+
+
+# ------------------------------------------------------------------- sides of one slave
+def test_a_side_of_the_slave_does_not_see_the_master_through_its_body():
+    """Top and side of a block as the slave: a die on top has nothing to do with the side."""
+    upper = am.Body(am.box((0.6, 0.5), (3, 2), origin=(0.5, 1.0)), NEO, name="upper")
+    mesh = am.box((2, 1), (8, 4))
+    (top,), (side,) = mesh.surface("top"), mesh.surface("left")
+    both = (replace(top, nodes=np.concatenate([top.nodes, side.nodes])),)
+    mesh = mesh.with_surfaces({"both": both})
+    force = []
+    for name in ("top", "both"):
+        model = am.Model([am.Body(mesh, NEO, name="lower"), upper],
+                         [am.Fix("lower.bottom", 0), am.Fix("upper.top", (0.0, -0.04))],
+                         contacts=[pair((f"lower.{name}", "upper.bottom"), 0.3)])  # fmt: skip
+        (step,) = am.evolve(model, am.QuasiStatic(1.0), until=1.0)
+        force.append(spread(step)[1])
+    assert np.abs(force[1] - force[0]).max() < 1e-8 * np.abs(force[0]).max()

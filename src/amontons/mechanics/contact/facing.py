@@ -263,3 +263,17 @@ def nearest(of: Index, area: Array, gap: Array, whole: Array) -> Mask:
     out = np.zeros(len(of), dtype=bool)
     out[order] = covered - before <= (1 + TWICE) * whole[of[order]]
     return out
+
+
+def seen_through(other: Index, gap: Array, length: Array) -> Mask:
+    """Pairs (k,) that a slave sees through its own body, which no force joins.
+
+    other (k,): master facets, gap (k,) from the slave's; length: of master facets.  Sides of
+    one surface that stand on each other, as top and side of a block, both face a master that
+    is tilted: the side, edge-on, from behind.  What is behind a facet of the slave by more than
+    behind any other one is farther off by at most its own length where it faces all of them
+    within 45 degrees; else the other one lies between.
+    """
+    behind = np.full(len(length), -np.inf)
+    np.maximum.at(behind, other, gap)
+    return gap < np.minimum(behind[other], 0.0) - length[other]

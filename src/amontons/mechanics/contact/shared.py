@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from .dual import dual_functions, nodes_with_multiplier
 from .facet_integrals import FacetPairs
-from .facing import Skin, candidates, nearest
+from .facing import Skin, candidates, nearest, seen_through, shapes
 
 if TYPE_CHECKING:
     from .current_mortar import MortarPair
@@ -58,6 +58,9 @@ class Shared:
         gap = np.einsum("kc,kc->k", between, vectors[of])
         gap /= np.where(area > 0, area, 1.0) * whole[of]
         there = np.flatnonzero(area > 0)
+        if fold is None and (gap[there] < 0).any():
+            length = 2 * shapes(master, x)[2]
+            there = there[~seen_through(other[there], gap[there], length)]
         there = there[nearest(of[there], area[there], gap[there], whole)]
         reached = np.bincount(of[there], area[there], minlength=len(whole))
         there = there[(reached > SLIVER * whole)[of[there]]]
