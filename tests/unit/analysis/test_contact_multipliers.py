@@ -5,6 +5,7 @@ import pytest
 
 import amontons as am
 from amontons.analysis.certificates import bounds_in_space
+from amontons.analysis.certificates import contact_multipliers as contact_multipliers_module
 from amontons.analysis.certificates.contact_multipliers import (
     ContactMultipliers,
     contact_multipliers,
@@ -12,7 +13,7 @@ from amontons.analysis.certificates.contact_multipliers import (
 )
 from amontons.analysis.certificates.critical_friction import critical_friction
 from amontons.analysis.certificates.energy_bound import energy_bound
-from amontons.core.clock import Deadline
+from amontons.core.clock import RATE, Deadline
 from amontons.core.errors import TimeUp
 
 
@@ -130,6 +131,17 @@ def test_multipliers_are_in_the_units_of_the_problem():
     units = np.repeat([1e-5, 3.0, 7e4], 3)
     other = contact_multipliers(W * units * units[:, None], shape)
     assert other.t == pytest.approx(contact_multipliers(W, shape).t, rel=0.02)
+
+
+def test_an_eigenvalue_that_was_missed_before_the_proof_leaves_a_bound(monkeypatch):
+    """t of the search is 1 % too large, and there is time for two proofs."""
+    W, mu, _ = random_problem(4, 3, contacts=3)
+    form = contact_multipliers_module._Form.of(W, mu / mu.max())
+    x = np.zeros(form.unknowns)
+    true = form.sharpened(x)
+    monkeypatch.setattr(type(form), "sharpened", lambda self, x: 1.01 * true)
+    found = form.proved(x, Deadline.counted(2.5 * form.proof / RATE), np.inf)
+    assert 0.98 * true < found.t < true
 
 
 def test_many_contacts_begin_with_few():

@@ -48,8 +48,9 @@ SHIFTS = (-0.7, -0.35, 0.0, 0.2, 0.5, 0.7, 1.0)  # of log alpha, tried with all 
 SHARES = (1.0, 0.6, 0.3, 0.0)  # of the variation of the others, until A is definite
 SOFT = (40.0, 100.0)  # over how much of the largest L is smoothed, one search after the other
 STEPS = 60  # of a search where contacts are few
-MANY, FINE_STEPS = 1000, 40  # rows from which on, and steps where a coarser answer was at hand
+MANY, FINE_STEPS = 1000, 20  # rows from which on, and steps where a coarser answer was at hand
 ROOMS = (1e-4, 1e-3, 5e-3, 2e-2, 0.1)  # by which less is proved than was found
+SURE = 2e-2  # the least where it is the last proof that there is time for
 SINGLE = 0.25  # of the work of RATE: half the length, and products of matrices
 PROOF = 1.0  # operations of a proof per cube of the rows
 PROOFS = 2.0  # for which the search leaves time
@@ -93,7 +94,7 @@ def _searched(form: _Form, deadline: Deadline, wanted: float) -> Array:
         coarse, weight = form.thinned()
         x = form.interpolated(_searched(coarse, deadline.share(COARSE), np.inf), weight)
         steps = FINE_STEPS if len(form.W) > MANY else STEPS
-        form = form.for_search(x)
+        form = form.for_search()
         x = form.shifted(x, deadline)
     for soft in SOFT:
         x = form.improved(x, soft, steps, deadline, wanted * (1 + 10 * ROOMS[0]))
@@ -130,15 +131,15 @@ class _Form(Pencil):
         tangent = (normal[:, None] + np.arange(1, d)).ravel()
         return cls(W / root / root[:, None], shape, root, normal, tangent, own.repeat(d - 1))
 
-    def for_search(self, x: Array) -> _Form:
-        """The same in numbers of half the length where A is definite in them at x too.
+    def for_search(self) -> _Form:
+        """The same in numbers of half the length where W is definite in them too.
 
         Half the work of large matrices; what is found is proved in numbers of full length.
         """
         if self.size <= DENSE:
             return self
         single = replace(self, W=self.W.astype(np.float32))
-        return self if single.factor(x) is None else single
+        return self if single.factor(np.zeros(self.unknowns)) is None else single
 
     @cached_property
     def sliding(self) -> Array:
@@ -291,8 +292,12 @@ class _Form(Pencil):
             if not deadline.affords(self.proof):
                 break
             deadline.spend(self.proof)
+            if room > ROOMS[0] and not deadline.affords(self.proof):
+                room = max(room, SURE)
             if holds(given, self.shape, t * (1 - room), by):
                 return replace(by, t=t * (1 - room))
+            if room == ROOMS[0]:
+                t = min(t, self.sharpened(x))  # goes on where the first one ended
         return by
 
 

@@ -23,6 +23,7 @@ Array = NDArray[np.float64]
 POWERS = (0.0, 0.5, 1.0)  # of |W_ii|, to which alpha is proportional
 SYMMETRIC = 1e-12  # relative: what is estimated does not see less
 EXACT = 400  # rows up to which norms come from all singular values
+NEAR = 1e-7  # relative, of an estimate: what is proved is less by more
 ESTIMATED = 1.0  # operations of the estimate per cube of the rows, without its norms
 PROVED = 1.0  # the same of a proof
 
@@ -97,7 +98,11 @@ def _norm(A: Array) -> float:
     square = LinearOperator((n, n), matvec=lambda x: A.T @ (A @ x), dtype=float)
     start = np.cos(np.arange(n) + 0.5)
     try:
-        return float(np.sqrt(eigsh(square, 1, v0=start, return_eigenvectors=False)[0]))
+        found = eigsh(
+            square, 1, v0=start, return_eigenvectors=False,
+            tol=NEAR,  # pyright: ignore[reportArgumentType]
+        )
+        return float(np.sqrt(found[0]))
     except ArpackNoConvergence:
         return float(np.linalg.norm(A))
 

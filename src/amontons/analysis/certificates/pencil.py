@@ -10,6 +10,7 @@ from __future__ import annotations
 
 from abc import ABC, abstractmethod
 from collections.abc import Callable
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
@@ -17,12 +18,14 @@ from scipy.linalg import LinAlgError, cholesky, eigh, solve_triangular
 
 from ...core.clock import Deadline
 from ...core.errors import TimeUp
+from .descent import Descent, Point
 
 Array = NDArray[np.float64]
 INDEFINITE = 1e3  # the value where A is not positive definite
 FARTHEST = 300.0  # size of x, logarithms among them, beyond which nothing is tried
 DENSE = 400  # rows up to which all eigenvalues are computed
-KEPT = 40  # largest ones that count beyond
+KEPT, PART = 40, 40  # largest ones that count beyond, at least; rows of which one more counts
+NEW = 8  # random directions among those where the block begins
 DEPTH = 3  # products of the block Krylov space in which they are looked for
 TILE = 256  # rows of a matrix and its transpose that fit into the cache together
 EIGENVALUES = (2e6, 2e3, 1.0)  # operations: always, per square and cube of rows
@@ -56,9 +59,24 @@ class Pencil(ABC):
         """Of one evaluation: all eigenvalues, or a factorisation and products with it."""
         n = float(self.size)
         if n > DENSE:
-            return n**3 / 3 + 5.0 * DEPTH * KEPT * n**2
+            return n**3 / 3 + 5.0 * DEPTH * (self.kept + NEW) * n**2
         always, square, cube = EIGENVALUES
         return always + square * n**2 + cube * n**3
+
+    @property
+    def kept(self) -> int:
+        """Largest eigenvalues that count: more contacts have more places where one is large."""
+        return max(KEPT, self.size // PART)
+
+    @cached_property
+    def chance(self) -> np.random.Generator:
+        """The same numbers in every run."""
+        return np.random.default_rng(0)
+
+    @cached_property
+    def remembered(self) -> list[tuple[Array, Array, float]]:
+        """Of the last search: what bends one value bends a sharper one too."""
+        return []
 
     def factor(self, x: Array) -> Array | None:
         """L (size, size) of A = L L^T, None where A is indefinite."""
@@ -80,7 +98,7 @@ class Pencil(ABC):
         size = self.size
         if size <= DENSE:
             C = product(np.eye(size, dtype=root.dtype))
-            few = (max(0, size - KEPT), size - 1)
+            few = (max(0, size - self.kept), size - 1)
             w, y = eigh((C + C.T) / 2, check_finite=False, subset_by_index=few)
         else:
             w, y = self._in_subspace(product, root)
@@ -91,11 +109,17 @@ class Pencil(ABC):
     def _in_subspace(
         self, product: Callable[[Array], Array], root: Array
     ) -> tuple[Array, Array]:
-        """Ritz values and vectors of a block Krylov space that begins with the last ones."""
-        begin, depth = self.subspace, DEPTH
-        if begin is None:
-            begin = np.random.default_rng(0).standard_normal((len(root), KEPT))
+        """Ritz values and vectors of a block Krylov space that begins with the last ones.
+
+        And with random directions: what the last ones are across is not missed for long.
+        """
+        new = NEW if self.subspace is not None else self.kept
+        begin = self.chance.standard_normal((len(root), new))
+        depth = DEPTH
+        if self.subspace is None:
             depth = 3 * DEPTH
+        else:
+            begin = np.hstack([self.subspace, begin])
         Q = np.linalg.qr(begin.astype(root.dtype, copy=False))[0]
         blocks, images = [Q], []
         for k in range(depth):
@@ -110,9 +134,9 @@ class Pencil(ABC):
         if not np.isfinite(H).all():
             return np.full(1, np.nan), basis[:, :1]  # told as none
         w, s = eigh((H + H.T) / 2)
-        y = basis @ s[:, -KEPT:]
+        y = basis @ s[:, -self.kept :]
         self.subspace = y
-        return w[-KEPT:].astype(float), y
+        return w[-self.kept :].astype(float), y
 
     def sharpened(self, x: Array) -> float:
         """t = 1 / L at x, as well as can be told; inf without an L > 0, 0 without A."""
@@ -130,7 +154,12 @@ class Pencil(ABC):
 
         Minus INDEFINITE where no L is positive: every t is good.
         """
-        root = self.factor(x)
+        return self._value(x, self.factor(x), soft, gradient=gradient)
+
+    def _value(
+        self, x: Array, root: Array | None, soft: float, *, gradient: bool = True
+    ) -> tuple[float, Array]:
+        """The same with the root of A."""
         found = None if root is None else self.largest(x, root)
         if found is None:
             return INDEFINITE, np.zeros_like(x)
@@ -150,28 +179,28 @@ class Pencil(ABC):
         self, x: Array, soft: float, steps: int, deadline: Deadline, enough: float
     ) -> Array:
         """x after so many steps, or when the value is below -log(enough), or in time."""
-        best = [np.inf, x]
-        from scipy.optimize import minimize  # a start of the program does not wait for it
+        goal = -np.log(enough) if enough > 0 else np.inf
 
-        goal = np.log(enough) if enough > 0 else -np.inf
+        def point(y: Array, root: Array | None) -> Point[Array | None]:
+            value, gradient = self._value(y, root, soft)
+            return Point(y, value if value < INDEFINITE else np.inf, gradient, root)
 
-        def value(y: Array) -> tuple[float, Array]:
+        def at(y: Array) -> Point[Array | None]:
             deadline.pay(self.operations)
-            if np.abs(y).max(initial=0.0) > FARTHEST:
-                return INDEFINITE, np.zeros_like(y)
-            found = self.value(y, soft)
-            if found[0] < best[0]:
-                best[:] = found[0], y.copy()
-                if -found[0] > goal:
-                    raise StopIteration
-            return found
+            return point(y, self.factor(y) if np.abs(y).max(initial=0.0) <= FARTHEST else None)
 
+        def again(known: Point[Array | None]) -> Point[Array | None]:
+            deadline.pay(self.operations - float(self.size) ** 3 / 3)
+            return point(known.x, known.kept)
+
+        descent = Descent(
+            at, again if self.size > DENSE else None, goal, memory=self.remembered
+        )
         try:
-            minimize(value, x, jac=True, method="L-BFGS-B",
-                     options={"maxiter": steps, "maxfun": 2 * steps})  # fmt: skip
-        except (StopIteration, TimeUp):
+            descent.run(x, steps)
+        except TimeUp:
             pass
-        return best[1]
+        return x if descent.best is None else descent.best.x
 
 
 def symmetrised(A: Array) -> Array:
