@@ -61,8 +61,10 @@ def test_a_top_nods_and_turns_as_lagrange_says():
 
 def test_bodies_that_overlap_as_given_are_named():
     """Depth, place and both bodies; nothing where they only touch, or of later steps."""
-    balls = [RigidBody(Ball(0.1), position=(x, 0, z), name=name)
-             for x, z, name in ((0, 0.1, "left"), (0.17, 0.1, ""), (1, 0.1, ""), (2, 0.08, ""))]
+    balls = [
+        RigidBody(Ball(0.1), position=(x, 0, z), name=name)
+        for x, z, name in ((0, 0.1, "left"), (0.17, 0.1, ""), (1, 0.1, ""), (2, 0.08, ""))
+    ]
     _, steps = last(RigidBodies(balls, [FLOOR]), 1e-3, 3e-3)
     (said,) = steps[0].warnings
     assert said.name == "overlap-at-start"
@@ -106,3 +108,41 @@ def test_the_mending_of_overlaps_is_limited_in_time_and_judged(monkeypatch):
     assert seen == [deadline]
     next(evolve_rigid(system, **asked, check=False))
     assert seen == [deadline] * 3
+
+
+def test_a_wheel_without_rim_rolls_down_as_mcgeer_says():
+    """T. McGeer, Passive dynamic walking, IJRR 9 (1990): a corner's impact keeps eta of w."""
+    count, radius, slope, step = 8, 0.5, 0.12, 2e-3
+    half = np.pi / count
+    around = 2 * half * (np.arange(count) + 0.5)
+    corners = radius * np.column_stack([np.cos(around), np.sin(around)])
+    sides = [np.column_stack([corners, np.full(count, z)]) for z in (-0.2, 0.2)]
+    shape = am.Polyhedron(np.vstack(sides))
+    still = RigidBody(shape, 1000)
+    own, arm = still.inertia[2, 2], still.mass * radius**2
+    eta = (own + arm * np.cos(2 * half)) / (own + arm)
+    gained = 2 * arm / radius * G / (own + arm) * 2 * np.sin(slope) * np.sin(half)
+    after = eta * np.sqrt(gained / (1 - eta**2))  # angular velocity of the cycle
+    height = radius * np.cos(half)
+    begins = after * np.array([height, 0, radius * np.sin(half)])
+    wheel = RigidBody(shape, 1000, (0, 0, height), (1, 1, 0, 0), begins, (0, after, 0))
+    pull = G * np.array([np.sin(slope), 0, -np.cos(slope)])
+    system = RigidBodies([wheel], [FLOOR], mu=1.5, gravity=pull)
+    end, steps = last(system, step, 8 * 0.38814)  # once round, by the pendulum's equation
+    speeds = np.array([s.state.motion.spin[0, 2] for s in steps])
+    assert end.position[0, 0] == pytest.approx(16 * radius * np.sin(half), rel=0.01)
+    assert np.abs(speeds).max() == pytest.approx(after / eta, rel=0.01)
+    assert max(abs(s.energies.defect) for s in steps) < 1e-11
+
+
+def test_more_balls_of_a_cradle_keep_momentum_and_energy():
+    """u1 = -u0 at the contact that is hit, 0 at those at rest: two balls hit three."""
+    start = (0, 0.1, 0.21, 0.31, 0.41)
+    speeds = [float(x < 0.2) for x in start]
+    balls = [
+        RigidBody(Ball(0.05), 1000, (x, 0, 0), velocity=(speed, 0, 0))
+        for x, speed in zip(start, speeds, strict=True)
+    ]
+    end, _ = last(RigidBodies(balls, mu=0, restitution=1, gravity=(0, 0, 0)), 1e-3, 0.03)
+    speeds = end.state.motion.velocity[:, 0]
+    assert speeds == pytest.approx([-0.2, -0.2, 0.8, 0.8, 0.8], abs=1e-5)

@@ -347,7 +347,8 @@ def test_an_arch_stands_on_both_sides_of_its_least_thickness(thickness, stands):
      ({"planes": [am.Plane((0, 1))]}, "planes"),
      ({"apart": [(0, 0.5)]}, "apart"), ({"bodies": []}, "bodies"), ({"bodies": [1]}, "bodies"),
      ({"bodies": RigidBody(Ball(1.0))}, "bodies: expected a list"), ({"apart": [3]}, "apart"),
-     ({"planes": am.Plane((0, 0, 1))}, "planes: expected a list"), ({"joints": [3]}, "joints")],
+     ({"planes": am.Plane((0, 0, 1))}, "planes: expected a list"), ({"joints": [3]}, "joints"),
+     ({"joints": [Joint(0, -1, (0, np.nan, 0))]}, r"joints\[0\].point")],
 )  # fmt: skip
 def test_bad_systems_are_refused_by_name(change, match):
     given = {"bodies": [RigidBody(Ball(1.0))], **change}
@@ -371,7 +372,8 @@ def test_bad_steps_are_refused_by_name(options, match):
     ("options", "match"),
     [({"density": 0}, "density"), ({"position": (0, 1)}, "position"),
      ({"orientation": (0, 0, 0, 0)}, "orientation"), ({"velocity": (0, 0, np.nan)}, "velocity"),
-     ({"shape": "ball"}, "shape")],
+     ({"shape": "ball"}, "shape"), ({"shape": cuboid((1, 1e-9, 1e-9))}, "shape: .* thicker"),
+     ({"density": 1e-320}, "moments")],
 )  # fmt: skip
 def test_bad_bodies_are_refused_by_name(options, match):
     with pytest.raises(am.InvalidInput, match=match):

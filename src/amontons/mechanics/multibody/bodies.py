@@ -17,7 +17,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from ...core.arrays import finite, number, read_only
-from ...core.errors import InvalidInput, shown
+from ...core.errors import InvalidInput, dotted, shown
 from ...core.locks import KeepsLocks
 from ...core.words import helpful
 from ..contact.geometry import Plane
@@ -26,6 +26,8 @@ from .shapes import Ball, Polyhedron
 Array = NDArray[np.float64]
 Index = NDArray[np.int64]
 GROUND = -1  # the number of what does not move
+ROUNDING = float(np.finfo(float).eps)  # of the largest moment of inertia: error of the smallest
+TINY = float(np.finfo(float).tiny)  # numbers below have no inverse
 
 
 @helpful
@@ -62,12 +64,25 @@ class RigidBody(KeepsLocks):
             if vector.shape != (size,):
                 raise InvalidInput(f"expected {size} numbers, got {shown(value)}", (key,))
             object.__setattr__(self, key, read_only(vector))
+        self._check_inertia()
         length = float(np.linalg.norm(self.orientation))
         if not length > 0:
             raise InvalidInput("expected a quaternion of length > 0", ("orientation",))
         object.__setattr__(
             self, "orientation", read_only(np.asarray(self.orientation) / length)
         )
+
+    def _check_inertia(self) -> None:
+        """Raise InvalidInput where mass or moments of inertia are nothing, or too large."""
+        inertia = self.inertia
+        whole = bool(np.isfinite(inertia).all())
+        smallest, _, largest = np.linalg.eigvalsh(inertia) if whole else (0.0, 0.0, np.inf)
+        if not smallest > ROUNDING * largest or not TINY < min(self.mass, smallest):
+            raise InvalidInput(
+                "expected mass and moments of inertia that rounding leaves, got mass "
+                f"{self.mass:.3g}, moments from {smallest:.3g} to {largest:.3g}: take a "
+                "thicker body or another unit", ("shape",),
+            )  # fmt: skip
 
     @property
     def mass(self) -> float:
@@ -166,7 +181,8 @@ class RigidBodies(KeepsLocks):
                 f"expected two of the {len(self.bodies)} bodies, the second {GROUND} for the "
                 f"ground, got {joint.first} and {joint.second}", at,
             )  # fmt: skip
-        if finite("point", joint.point, 1).shape != (3,):
+        point = finite(f"{dotted(at)}.point", joint.point, 1)
+        if point.shape != (3,):
             raise InvalidInput(f"point: expected 3 numbers, got {shown(joint.point)}", at)
 
     def gravity_at(self, time: float) -> Array:
