@@ -267,3 +267,22 @@ def test_what_has_no_modes_is_refused():
     with pytest.raises(am.InvalidInput, match="density"):
         am.modes(am.Model([am.Body(am.box((1, 1), 1), am.LinearElastic(1, 0.3))],
                           [am.Fix("top", 0)]))  # fmt: skip
+
+
+def test_flutter_says_up_to_which_frequency_it_looked():
+    """Models of two by two side by side: i times as fast; the last meet above what is kept."""
+    n = 220
+    squares = np.arange(1.0, n + 1) ** 2
+    K = sparse.kron(sparse.diags_array(squares), [[K11, K12], [K12, K22]], format="csc")
+    H = sparse.kron(sparse.eye_array(n), [[0.0, 1.0], [1.0, 0.0]], format="csc")
+    load = np.kron(squares, [0.0, -5.0])
+    law = am.Compliant(am.Coulomb([0.2] * n), list(1 / (K3 * squares)))
+    problem = am.FrictionProblem.from_global(K, H, load, [[0.0, 1e3]] * n, law)
+    found = am.modes(am.solve(problem, tolerance=1e-12), 6, mass=sparse.eye_array(2 * n))
+    points = found.flutter(n)
+    meets = np.sqrt(squares * (K11 + K22 + K3) / 2) / (2 * np.pi)
+    inside = meets[meets <= points.up_to]
+    assert 0 < len(inside) < 20
+    assert sorted(p.frequency for p in points) == pytest.approx(list(inside), rel=1e-8)
+    assert [p.mu for p in points] == pytest.approx([FLUTTER] * len(inside), rel=1e-8)
+    assert on_a_belt(0.2).flutter().up_to == np.inf

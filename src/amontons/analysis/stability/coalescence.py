@@ -57,16 +57,24 @@ class Flutter:
 
 
 class FlutterPoints(tuple[Flutter, ...]):
-    """Points, friction ascending; warnings: those that could not be made precise, in words."""
+    """Points, friction ascending; warnings: those that could not be made precise, in words.
+
+    `up_to`: the frequency up to which was looked; points of higher ones are not told.
+    """
 
     warnings: tuple[ResultWarning, ...]
+    up_to: float
 
     def __new__(
-        cls, points: Iterable[Flutter] = (), warnings: tuple[ResultWarning, ...] = ()
+        cls,
+        points: Iterable[Flutter] = (),
+        warnings: tuple[ResultWarning, ...] = (),
+        up_to: float = np.inf,
     ) -> FlutterPoints:
         """With warnings."""
         made = super().__new__(cls, points)
         made.warnings = warnings
+        made.up_to = up_to
         return made
 
 
@@ -94,7 +102,8 @@ def flutter_points(state: SlidingState, count: int, most: int) -> FlutterPoints:
         if not any(same(point, start, NEAR) for point in found):
             failed.append(start)
     last = out[most - 1].mu if len(out) >= most else np.inf
-    return FlutterPoints(out[:most], _doubts(state, failed, known, last))
+    up_to = np.inf if small.every else float(np.sqrt(small.reach) / (2 * np.pi))
+    return FlutterPoints(out[:most], _doubts(state, failed, known, last), up_to)
 
 
 def _doubts(

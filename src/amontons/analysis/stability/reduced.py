@@ -54,6 +54,7 @@ class Reduced:
     rho: Array
     G: Array
     reach: float  # l up to which it is to be trusted
+    every: bool  # no mode is left out
 
     @classmethod
     def of(cls, state: SlidingState, count: int) -> Reduced:
@@ -75,7 +76,7 @@ class Reduced:
         G = _left_out(state, F_1, columns, l, along, rho)
         every = len(l) >= state.K.shape[0] - state.F_0.shape[1]  # some may give way
         top = float(l.max(initial=0.0))
-        return cls(l, phi, along, rho, G, LARGEST * top if every else TRUSTED * top)
+        return cls(l, phi, along, rho, G, (LARGEST if every else TRUSTED) * top, every)
 
     def matrix(self, p: float) -> Array:
         """A(p) (k, k)."""

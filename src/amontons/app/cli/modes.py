@@ -6,6 +6,7 @@ from collections.abc import Sequence
 from typing import Any
 
 import click
+import numpy as np
 
 from ...core.errors import InvalidInput
 from ...io.results import FIGURES, to_json, versions
@@ -36,6 +37,8 @@ def run(  # noqa: PLR0913
             click.echo(f"flutter from friction {point.mu:.7g} on, at {point.frequency:.7g}")
         for doubt in () if points is None else points.warnings:
             click.echo(str(doubt))
+        if points is not None and np.isfinite(points.up_to):
+            click.echo(f"flutter was looked for at frequencies up to {points.up_to:.4g}")
         if points == () and not points.warnings:
             click.echo("no flutter at any friction was found")
     if json_copy is not None:
@@ -43,6 +46,8 @@ def run(  # noqa: PLR0913
         record["flutter"] = None if points is None else [
             {"friction": p.mu, "frequency": p.frequency} for p in points
         ]  # fmt: skip
+        up_to = np.inf if points is None else points.up_to
+        record["flutter_looked_up_to"] = up_to if np.isfinite(up_to) else None
         record["warnings"] = [] if points is None else [w.record for w in points.warnings]
         deliver_json(to_json({**record, "versions": versions()}), json_copy)
     if picture is not None:
