@@ -30,9 +30,9 @@ believed less: its rest counts C / (GRACE F) times.  Besides
                 the others, and comes before them
     nothing     where no track promises anything, the one that has cost least
 
-    the end     where five times as much was spent as when the best error last halved, and a
-                thousand Newton steps' worth, and many chunks or some seconds, with few contacts
-                less, since
+    the end     where five times as much was spent as when the best error, or that of a track
+                near it, last halved, and a thousand Newton steps' worth, and many chunks or
+                some seconds, with few contacts less, since
 
 So no track is ever given up, none takes more than its share while it does not progress, and
 only ratios of costs matter, which are operation counts.
@@ -71,6 +71,7 @@ ENTRY, ENTRY_BLOCK = 3e5, 150.0
 # All cost, in what it was at the last progress; Newton steps since, and nanoseconds or chunks;
 # nanoseconds as dense factors cost, by the cube of contacts, up to some seconds.
 LOST, LOST_STEPS, LOST_CUBED, LOST_MOST, LOST_CHUNKS = 5.0, 1000.0, 2e6, 2e9, 500
+BESIDE = 10.0  # times the best error up to which a track's own progress counts as that of all
 # Cost between two iterates that are handed out, of all cost, and its bounds in nanoseconds: the
 # driver's judgement costs more than a chunk of a small problem, but it looks at the clock.
 PAUSE, LEAST_PAUSE, MOST_PAUSE = 0.1, 1e6, 5e7
@@ -150,6 +151,7 @@ class Track:
     chunks: Chunks | None = None
     promise: float = math.inf  # nanoseconds to the goal at its rate
     foreseen: float = math.inf  # the least cost at which it has promised the goal
+    mark: float = math.inf  # its error when that last halved
 
     def advance(self, growth: float = GROWTH) -> Chunk | None:
         """A chunk, its reaction taken by the state; None where the method has ended.
@@ -210,6 +212,12 @@ class Track:
         fall = higher / error if len(self.path) > 2 else min(higher / error, TENTH)
         rest = math.log(error / self.state.goal) * (cost - before)
         return rest / math.log(fall) if fall > 1.0 else math.inf
+
+    def halved(self) -> bool:
+        """True where its best error is half of what it was when this was last so."""
+        before, error = min(self.mark, self.errors[0]), self.errors[-1]
+        self.mark = error if error < 0.5 * before else before
+        return self.mark < before
 
     def aim(self) -> None:
         """Promise the goal of the state anew."""
@@ -291,7 +299,7 @@ class Race:
         self.done = Done()  # since then
         self.chunks = 0
         self.shows_all = False  # where the driver ends what can not come to an end
-        # error, total and chunks at the last progress
+        # error when the best last halved; total and chunks at the last progress
         self.mark = (self.state.first_error, 0.0, 0)
         self.fall = [(0.0, self.state.first_error)]  # total and best error whenever that fell
 
@@ -355,6 +363,8 @@ class Race:
         if self.state.error < self.fall[-1][1]:
             self.fall.append((self.total, self.state.error))
         self.done.add(chunk, track.entry.name)
+        if track.halved() and track.errors[-1] <= BESIDE * self.state.error:
+            self.mark = self.mark[0], self.total, self.chunks
         if self._is_due():
             judged = yield self._shown()
             if judged is not None and judged.goal < self.state.target.tolerance:
@@ -365,9 +375,7 @@ class Race:
     def _shown(self) -> Iterate:
         """The best reaction for the driver."""
         done, self.done, self.shown = self.done, Done(), self.total
-        return self.state.best(
-            done.iterations, done.stage, done.flops, done.linear_iterations
-        )
+        return self.state.best(done.iterations, done.stage, done.flops, done.linear_iterations)
 
     def _is_due(self) -> bool:
         """True where the driver should see the best reaction: it may do, or it has waited."""
