@@ -352,6 +352,24 @@ def test_the_race_ends_where_nothing_helps():
     assert LOST_CHUNKS < race.chunks < 2 * LOST_CHUNKS
 
 
+def test_the_race_goes_on_while_a_track_falls_just_above_the_best():
+    def from_there(part, factor):
+        def chunks(state):
+            yield Chunk(state.start, 0, 0.0)
+            for k in range(10**6):
+                error = part * factor**k * state.first_error
+                _ = yield Chunk(state.start, 1, UNIT, error=error)
+
+        return chunks
+
+    state = state_of(random_delassus(0, 10))
+    race = Race(state, (Entry("stands", from_there(1e-4, 1.0)),
+                        Entry("falls", from_there(8e-4, 0.997))))  # fmt: skip
+    below = 5e-5 * state.first_error
+    assert any(state.error < below for _ in race.iterates())
+    assert race.chunks > LOST_CHUNKS
+
+
 def test_what_is_not_handed_out_is_counted():
     race = Race(state_of(random_delassus(0, 10)), (Entry("a", falling(0.9, 0.01, count=7)),))
     found = list(race.iterates())

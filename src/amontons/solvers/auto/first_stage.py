@@ -33,8 +33,16 @@ from ..sweeps.kernels import (
     flops_of_sweep,
 )
 from ..sweeps.local_contact import CLOSE, STEPS
-from .race import CALL, FIRST_CHUNKS, GROWTH, SHORTEST, chunks_alone
-from .state import HISTORY_CONTACT, SIZES, is_brief, nanoseconds_of_sweep, visits
+from .race import CALL, GROWTH, SHORTEST
+from .state import (
+    FIRST_CHUNKS,
+    HISTORY_CONTACT,
+    SIZES,
+    chunks_alone,
+    is_brief,
+    nanoseconds_of_sweep,
+    visits,
+)
 from .tracks import DEPTH, LEAST
 
 Array = NDArray[np.float64]

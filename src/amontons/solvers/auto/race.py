@@ -31,8 +31,8 @@ believed less: its rest counts C / (GRACE F) times.  Besides
     nothing     where no track promises anything, the one that has cost least
 
     the end     where five times as much was spent as when the best error, or that of a track
-                near it, last halved, and a thousand Newton steps' worth, and many chunks or
-                some seconds, with few contacts less, since
+                just above it, last halved, and a thousand Newton steps' worth, and many chunks
+                or some seconds, with few contacts less, since
 
 So no track is ever given up, none takes more than its share while it does not progress, and
 only ratios of costs matter, which are operation counts.
@@ -51,13 +51,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...core.errors import SingularOperator
-from ...problem.friction import FrictionProblem
 from ..contract import Breakdown, Iterate, Iterates
-from .state import State, is_brief, is_stacked
+from .state import FIRST_CHUNKS, State, chunks_alone
 
 Array = NDArray[np.float64]
 WINDOW = 0.7  # last part of a track's cost from which its rate is told
-FIRST_CHUNKS = 3  # of the first track before its rate counts
 GRACE = 1.2  # times the cost at which a track has promised the goal: its promise is broken
 # Logarithm of the way to the goal, over that of the way to the best error, up to which that is
 # near; multiple of the best error at which it is taken to have been come by.
@@ -215,9 +213,9 @@ class Track:
 
     def halved(self) -> bool:
         """True where its best error is half of what it was when this was last so."""
-        before, error = min(self.mark, self.errors[0]), self.errors[-1]
-        self.mark = error if error < 0.5 * before else before
-        return self.mark < before
+        halved = self.errors[-1] < 0.5 * min(self.mark, self.errors[0])
+        self.mark = self.errors[-1] if halved else self.mark
+        return halved
 
     def aim(self) -> None:
         """Promise the goal of the state anew."""
@@ -278,11 +276,6 @@ def whole_way(fall: list[tuple[float, float]], goal: float, near: float = NEAR) 
     if part > near:
         return math.inf
     return part * next(cost for cost, error in fall if error <= ALMOST * best)
-
-
-def chunks_alone(problem: FrictionProblem, tolerance: float) -> int:
-    """Chunks that the first track has before any other, whatever it promises."""
-    return 1 if not is_brief(problem, tolerance) and is_stacked(problem) else FIRST_CHUNKS
 
 
 @dataclass(eq=False)
@@ -380,8 +373,8 @@ class Race:
     def _is_due(self) -> bool:
         """True where the driver should see the best reaction: it may do, or it has waited."""
         pause = min(max(PAUSE * self.total, LEAST_PAUSE), MOST_PAUSE)
-        waited = self.shows_all or self.total - self.shown >= pause
-        return waited or self.state.error <= self.state.goal
+        waited = self.total - self.shown >= pause
+        return self.shows_all or waited or self.state.error <= self.state.goal
 
     def _is_lost(self) -> bool:
         """True where nothing has helped for long."""
@@ -389,11 +382,10 @@ class Race:
         if self.state.error < 0.5 * error:
             self.mark = self.state.error, self.total, self.chunks
             return False
-        since = self.total - total
-        if not (self.total > LOST * total and since > LOST_STEPS * self.state.step_cost):
-            return False
-        long = min(LOST_CUBED * self.state.problem.contacts**3, LOST_MOST)
-        return since > long or self.chunks - chunks > LOST_CHUNKS
+        since, state = self.total - total, self.state
+        long = min(LOST_CUBED * state.problem.contacts**3, LOST_MOST)
+        needed = max((LOST - 1.0) * total, LOST_STEPS * state.step_cost)
+        return since > needed and (since > long or self.chunks - chunks > LOST_CHUNKS)
 
     def _next(self) -> Track:
         """The track that promises the goal for the least cost."""

@@ -41,6 +41,7 @@ DENSE = 0.5  # share of blocks of W above which it comes from a mesh
 SHORT = 5e3  # nanoseconds of a sweep of a problem that is brief whatever its tolerance
 COARSE, BLOCKS = 1e-4, 10_000  # tolerance from which, blocks of W to which larger ones are
 SIZES = 4096  # of problems whose counts are kept: time steps have the same again and again
+FIRST_CHUNKS = 3  # of the first track before its rate counts
 FEW = 30  # contacts up to which W may be full as all are on one rigid body
 
 
@@ -250,3 +251,8 @@ class State:
     def iterate(self, r: Array) -> Iterate:
         """A start for other solvers from r, (nc, 3)."""
         return Iterate(r[:, : self.problem.dimension].copy())
+
+
+def chunks_alone(problem: FrictionProblem, tolerance: float) -> int:
+    """Chunks that the first track has before any other, whatever it promises."""
+    return 1 if not is_brief(problem, tolerance) and is_stacked(problem) else FIRST_CHUNKS
