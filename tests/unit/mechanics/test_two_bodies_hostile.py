@@ -341,3 +341,19 @@ def test_chords_and_slivers_are_no_overlap_of_bodies():
     for depth, told in ((1e-3, False), (0.05, True)):
         upper = "upper", am.box((1, 1), (4, 2), origin=(0, 1 - depth))
         assert bool(overlapping(upper, lower)) == told
+
+
+def test_a_master_deep_inside_a_coarse_slave_is_told_and_the_other_way_is_not():
+    """A wedge goes between nodes of the slave, whose averages see little of its edge."""
+    wedge = am.box((0.6, 0.8), (6, 4), origin=(0.2, 0.5))
+    points = wedge.points + np.outer(1.5 * np.abs(wedge.points[:, 0] - 0.5), (0, 1))
+    bodies = [am.Body(am.box((1, 0.5), (3, 2)), am.NeoHookean(1.0, 0.3), name="low"),
+              am.Body(replace(wedge, points=points), am.NeoHookean(10.0, 0.3), name="up")]
+    supports = [am.Fix("low.bottom", 0), am.Fix("up.top", (0, -0.2))]
+    for slave, master, told in (("low.top", "up.bottom", 1), ("up.bottom", "low.top", 0)):
+        contact = am.Contact(slave, master=master, mu=0.3)
+        solution = am.solve(am.Model(bodies, supports, [contact]))
+        found = [w for w in solution.warnings if w.name == "master-inside-slave"]
+        assert len(found) == told
+        if told:
+            assert "make 'up.bottom' the slave, or refine 'low.top'" in found[0].message

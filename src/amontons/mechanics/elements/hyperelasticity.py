@@ -15,6 +15,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
+from functools import cached_property
 from typing import ClassVar
 
 import numpy as np
@@ -300,13 +301,28 @@ class HyperelasticBody:
 
     def unit_forces(self) -> Array:
         """Sizes of nodal forces (n,) where stresses are as large as moduli, for rounding."""
-        out = np.zeros(len(self.mesh.points))
+        return self._sizes[0]
+
+    def unit_stiffness(self) -> Array:
+        """Sizes of nodal forces per displacement (n,) where terms of F do not cancel.
+
+        F = I + sum_b u_b grad N_b has errors of eps (sum_b |u_b|^2 |grad N_b|^2)^1/2 from
+        the rounding of every u_b, also where u is the same all over and F = I.
+        """
+        return self._sizes[1]
+
+    @cached_property
+    def _sizes(self) -> Array:
+        out = np.zeros((2, len(self.mesh.points)))
         for cells, block in zip(self.mesh.cells, self._blocks, strict=True):
             cell, coordinates = CELLS[cells.kind], self.mesh.points[cells.nodes]
             for at, weight in zip(*rule_of(self.mesh, cells, finite=True), strict=True):
                 volume = weight * determinant(cell.jacobians(coordinates, at))
                 sizes = np.linalg.norm(cell.gradients(coordinates, at), axis=2)
-                np.add.at(out, cells.nodes, block.modulus * sizes * volume[:, None])
+                forces = block.modulus * sizes * volume[:, None]
+                np.add.at(out[0], cells.nodes, forces)
+                np.add.at(out[1], cells.nodes,
+                          forces * np.linalg.norm(sizes, axis=1)[:, None])  # fmt: skip
         return out
 
     def matrix(self, blocks: Array) -> sparse.bsr_array:

@@ -51,3 +51,9 @@ class LinearBody:
         apart = np.linalg.norm(self.mesh.points[self.columns] - self.mesh.points[rows], axis=1)
         sizes = np.linalg.norm(self._blocks, axis=(1, 2)) * apart
         return np.bincount(rows, sizes, minlength=len(self.mesh.points))  # type: ignore[return-value]  # numpy types only counts
+
+    def unit_stiffness(self) -> Array:
+        """Sizes of nodal forces per displacement (n,) where terms of K u do not cancel."""
+        rows = np.repeat(np.arange(len(self.mesh.points)), np.diff(self.pointers))
+        squares = (self._blocks**2).sum(axis=(1, 2))
+        return np.sqrt(np.bincount(rows, squares, minlength=len(self.mesh.points)))

@@ -262,7 +262,7 @@ class LargeDeformation(NonlinearProblem):
         held[self.parts.free] = self.load.at(self.displacement(v))[self.parts.free]
         load = np.hypot(np.linalg.norm(held), np.linalg.norm(rest[self.parts.at]))
         length = np.linalg.norm([u, r * self.parts.contact.softness[:, None]])
-        least = self.parts.resolved
+        least = self.parts.resolved(self.displacement(v))
         return max(float(load), least[0]), max(float(length), least[1])
 
     def weakest(self, r: Array, v: Array | None = None) -> Weakest:
@@ -275,8 +275,8 @@ class LargeDeformation(NonlinearProblem):
             return Weakest(np.inf, None)
         own = np.linalg.norm(u, axis=1)
         own += np.linalg.norm(r, axis=1) * self.parts.contact.softness
-        law = self._law_at(self.parts.meet(self.displacement(v)))
-        return judge.weakest_of(r, u, law, self.rho, own + self.parts.resolved[1])
+        own += self.parts.resolved(moved := self.displacement(v))[1]
+        return judge.weakest_of(r, u, self._law_at(self.parts.meet(moved)), self.rho, own)
 
     # ---------------------------------------------------------------- load steps
     @property

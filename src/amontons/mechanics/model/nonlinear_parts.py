@@ -68,13 +68,26 @@ class NonlinearParts:
         """Reference positions of the contacts, (nc, d)."""
         return self.X.ravel()[self.at]
 
+    def unit_forces(self, u: Array) -> float:
+        """Size of the nodal forces of which rounding makes its part at u (nodes, d).
+
+        Of stresses like moduli, and where u is large beside cells of its terms in grad u.
+        """
+        forces, stiffness = self._of_rounding
+        moved = np.linalg.norm(u, axis=1) * stiffness
+        return float(np.hypot(np.linalg.norm(forces), np.linalg.norm(moved)))
+
     @cached_property
-    def resolved(self) -> tuple[float, float]:
-        """Sizes of forces and of u that rounding leaves with some eight digits."""
-        forces = np.concatenate([body.unit_forces() for body in self.bodies])
+    def _of_rounding(self) -> tuple[Array, Array]:
+        """`unit_forces` and `unit_stiffness` of the bodies, (nodes,) each."""
+        return (np.concatenate([body.unit_forces() for body in self.bodies]),
+                np.concatenate([body.unit_stiffness() for body in self.bodies]))  # fmt: skip
+
+    def resolved(self, u: Array) -> tuple[float, float]:
+        """Sizes of forces and of lengths that rounding leaves with some eight digits at u."""
         around = self.points - self.X.mean(axis=0)
-        return (RESOLVED * float(np.linalg.norm(forces)),
-                RESOLVED * float(np.linalg.norm(around)))  # fmt: skip
+        length = np.hypot(np.linalg.norm(around), np.linalg.norm(u.ravel()[self.at]))
+        return RESOLVED * self.unit_forces(u), RESOLVED * float(length)
 
     def check_tangent(self) -> None:
         """Raise UnsupportedForm where the tangent is not the derivative of the forces."""

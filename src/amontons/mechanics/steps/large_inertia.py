@@ -100,9 +100,6 @@ class LargeMovingModel:
         ]  # fmt: skip
         self.frames = InFrames.of(self.parts, inertia, method)
         weights = self._all.sites.weights
-        self.blur = BLUR * float(
-            np.linalg.norm(np.concatenate([own.unit_forces() for own in self.parts.bodies]))
-        )
         self._closed = TOUCHING * weights ** (1 / (model.dimension - 1))
         self.springs = Springs.of(body.law, model.dimension)
         self.law = self.springs.of_impulses(body.law, method.step, method.theta)
@@ -245,7 +242,8 @@ class _Step:
         terms = (m.M @ v0, m.M @ v1, inner, damped, load, pushed)
         size = sum(float(np.linalg.norm(term[free])) for term in terms) or 1.0
         error = float(np.linalg.norm(missing[free])) / size
-        return _Trial(turned, v1, impulse, missing, error, max(GOOD, h * m.blur / size))
+        blur = BLUR * m.parts.unit_forces(q1.reshape(m.parts.X.shape))
+        return _Trial(turned, v1, impulse, missing, error, max(GOOD, h * blur / size))
 
     def solver(self, solve: Any) -> Any:
         """solve of a linearised step: (trial, matrix) -> (velocities, solution)."""

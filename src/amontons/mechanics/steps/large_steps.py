@@ -169,7 +169,7 @@ def slid_open(problem: LargeDeformation, state: State, duration: float) -> Array
     apart = problem.earlier.gap + law.offset
     open_ = (state.force[:, 0] + law.cohesion < contact.rho * apart) & ~law.tied
     found = slid_while_open(parts.meet(u - moved), problem.earlier, u - moved, u, open_,
-                            law.offset, parts.resolved[1])  # fmt: skip
+                            law.offset, parts.resolved(u)[1])  # fmt: skip
     return found if found.any() else None
 
 

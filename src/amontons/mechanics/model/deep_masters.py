@@ -1,0 +1,86 @@
+"""A doubt about finite sliding: nodes of the master that lie deep inside the slave.
+
+Gaps are averages over the slave's facets: zero there says nothing of a node of the master
+between nodes of a coarser slave, as a sharp corner.  Its force is then at the wrong place.
+What overlaps by the law, by springs or a clearance, overlaps at the slave's nodes, too.
+"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ...core.warned import ResultWarning
+from ..contact.current_mortar import MortarMeeting
+from ..contact.facing import Skin
+from ..contact.pairs import project
+from ..meshes.facets import Facets
+from ..meshes.surfaces import facet_areas
+from .fields import ContactFields
+from .nonlinear_parts import nonlinear_parts
+
+if TYPE_CHECKING:
+    from .model import Model
+
+Array = NDArray[np.float64]
+DEEP = 1 / 3  # of the length of slave facets
+KINDS = {2: "line", 3: "tri", 4: "quad"}  # by corners
+
+
+def deep_masters(model: Model, fields: ContactFields) -> list[ResultWarning]:
+    """Pairs of which nodes of the master lie deeper in the slave than DEEP of its facets."""
+    displacement = np.concatenate(fields.displacement)
+    if not np.isfinite(displacement).all():
+        return []
+    parts = nonlinear_parts(model)
+    found = (_deep(meeting, parts.X) for meeting in parts.meet(displacement).parts)
+    return [warning for warning in found if warning is not None]
+
+
+def _deep(meeting: object, X: Array) -> ResultWarning | None:
+    if not isinstance(meeting, MortarMeeting) or meeting.pair.fold is not None:
+        return None
+    pair, x, shared = meeting.pair, meeting.x, meeting.shared
+    bearing = np.asarray(shared.kept.any(axis=1))  # others: `held_facets`
+    facing = np.unique(shared.master[bearing[shared.of]])
+    if not facing.size:
+        return None
+    slave = _blocks(pair.slave.part(shared.facets[bearing]))
+    master = pair.master.part(facing)
+    nodes = master.all
+    normals = _normals(pair.master, x)[nodes]
+    hit = project(x[nodes], x, slave, facing=normals, free=np.ones(len(nodes), dtype=bool))
+    depth = np.einsum("kc,kc->k", hit.closest - x[nodes], hit.normal)
+    by_law = -float((meeting.gap - pair.offset)[meeting.met].min(initial=0.0))
+    depth = np.where(hit.found, depth, 0.0) - by_law
+    areas = np.concatenate([facet_areas(x, block) for block in slave])
+    part = depth / areas[hit.facet] ** (1 / (x.shape[1] - 1))
+    worst = int(part.argmax())
+    if not part[worst] > DEEP:
+        return None
+    one, other = pair.names
+    return ResultWarning(
+        "master-inside-slave",
+        f"contact on {one!r} with {other!r}: {int((part > DEEP).sum())} nodes of the master "
+        f"lie inside the slave, up to {depth[worst]:.3g} or {part[worst]:.2g} of the length "
+        f"of its facet there, at {X[nodes[worst]].round(6).tolist()}; make {other!r} the "
+        f"slave, or refine {one!r} there",
+    )
+
+
+def _blocks(skin: Skin) -> tuple[Facets, ...]:
+    """Its facets between corners, kind after kind."""
+    return tuple(
+        Facets(KINDS[n], skin.nodes[skin.corners == n, :n]) for n in np.unique(skin.corners)
+    )
+
+
+def _normals(skin: Skin, x: Array) -> Array:
+    """Outward unit normals at its nodes, by area, (nodes, d); 0 where facets cancel."""
+    out, areas = np.zeros(x.shape), skin.areas(x)
+    for slot, real in enumerate(skin.real.T):
+        np.add.at(out, skin.nodes[real, slot], areas[real])
+    size = np.linalg.norm(out, axis=1, keepdims=True)
+    return out / np.where(size > 0, size, 1.0)
