@@ -386,7 +386,8 @@ def _time(time: float, until: float) -> Finding:
 
 def _only_bounded(name: str, found: Finding) -> Finding:
     """Forces of elements formulated otherwise say neither right nor wrong."""
-    if name in ("penetration", "time", "geometry") or found.verdict is UNDECIDED:
+    is_known = name in ("penetration", "time", "geometry") or not found.numbers  # or no pairs
+    if is_known or found.verdict is UNDECIDED:
         return found
     return Finding(UNDECIDED, "not known, forces of these elements are only bounded; " +
                    found.text, found.numbers, found.nodes)  # fmt: skip

@@ -91,6 +91,7 @@ def solve(**options: object) -> int:
 
 
 @main.command(
+    short_help="Say what a problem is, and which methods fit.",
     epilog="""\b
 Examples:
   amontons info part.step --picture faces.png      which face has which name
@@ -121,6 +122,7 @@ def info(**options: object) -> None:
 
 
 @main.command(
+    short_help="Compare methods on many problems.",
     epilog="""\b
 Examples:
   amontons bench *.hdf5 --methods gauss-seidel,auto --tolerances 1e-3,1e-6 --profile p.png
@@ -163,6 +165,7 @@ def bench(**options: object) -> None:
 
 @main.command(
     "enumerate",
+    short_help="Find all solutions, and prove that these are all.",
     epilog="""\b
 Examples:
   amontons enumerate example:hild             three solutions, and proof that there is no other
@@ -202,6 +205,7 @@ def enumerate_solutions(**options: object) -> int:
 
 
 @main.command(
+    short_help="Find which solution each method finds.",
     epilog="""\b
 Examples:
   amontons basins example:hild --mu 3.5 --methods uzawa,semismooth-newton
@@ -260,6 +264,7 @@ def basins(**options: object) -> int:
 
 
 @main.command(
+    short_help="Say whether a problem has one solution.",
     epilog="""\b
 Examples:
   amontons uniqueness example:hild            another solution, and the critical friction
@@ -295,6 +300,7 @@ def uniqueness(**options: object) -> int:
 
 
 @main.command(
+    short_help="Follow the solutions while load or friction changes.",
     epilog="""\b
 Examples:
   amontons follow example:vee                     two folds, three solutions between them

@@ -9,6 +9,7 @@ from .folders import results_folder
 
 
 @click.command(
+    short_help="Say whether a contact result is true.",
     epilog="""\b
 Examples:
   amontons audit model.inp model.frd                  is the result of CalculiX true?
@@ -50,6 +51,7 @@ def audit(**options: object) -> int:
 
 
 @click.command(
+    short_help="Write a problem, model or result in other formats.",
     epilog="""\b
 Examples:
   amontons convert global.hdf5 local.hdf5 --form local
@@ -82,6 +84,7 @@ def convert(**options: object) -> None:
 
 
 @click.command(
+    short_help="Check a certificate of uniqueness.",
     epilog="""\b
 Examples:
   amontons uniqueness example:hild --mu 1 --certificate c.h5
@@ -100,6 +103,7 @@ def check(certificate: str) -> int:
 
 
 @click.command(
+    short_help="Find the least friction that locks in a state.",
     epilog="""\b
 Examples:
   amontons jam example:brake                  from which friction on the arm can stay locked
@@ -129,6 +133,7 @@ def jam(**options: object) -> int:
 
 
 @click.command(
+    short_help="Bound the live load at which blocks give way.",
     epilog="""\b
 Examples:
   amontons collapse example:column --live 1,0           sideways, in parts of its weight
@@ -163,6 +168,7 @@ def collapse(**options: object) -> int:
 
 
 @click.command(
+    short_help="Find the complex modes of a sliding state.",
     epilog="""\b
 Examples:
   amontons modes case.toml --count 20 --picture modes.png
@@ -198,7 +204,7 @@ def modes(**options: object) -> int:
     return run(**options)  # type: ignore[arg-type]
 
 
-@click.command()
+@click.command(short_help="List the built-in examples.")
 def examples() -> None:
     """List the built-in examples: `amontons solve example:NAME`, in time `amontons run`."""
     from .sources import list_examples
