@@ -9,8 +9,7 @@ from .folders import results_folder
 
 
 @click.command(
-    short_help="Say whether a contact result is true.",
-    epilog="""\b
+    short_help="Say whether a contact result is true.", epilog="""\b
 Examples:
   amontons audit model.inp model.frd                  is the result of CalculiX true?
   amontons audit model.inp model.frd --solve --report -o model-audit
@@ -51,8 +50,7 @@ def audit(**options: object) -> int:
 
 
 @click.command(
-    short_help="Write a problem, model or result in other formats.",
-    epilog="""\b
+    short_help="Write a problem, model or result in other formats.", epilog="""\b
 Examples:
   amontons convert global.hdf5 local.hdf5 --form local
   amontons convert case.toml problem.hdf5
@@ -84,8 +82,7 @@ def convert(**options: object) -> None:
 
 
 @click.command(
-    short_help="Check a certificate of uniqueness.",
-    epilog="""\b
+    short_help="Check a certificate of uniqueness.", epilog="""\b
 Examples:
   amontons uniqueness example:hild --mu 1 --certificate c.h5
   amontons check c.h5
@@ -103,8 +100,7 @@ def check(certificate: str) -> int:
 
 
 @click.command(
-    short_help="Find the least friction that locks in a state.",
-    epilog="""\b
+    short_help="Find the least friction that locks in a state.", epilog="""\b
 Examples:
   amontons jam example:brake                  from which friction on the arm can stay locked
   amontons jam case.toml --json - | jq .upper
@@ -133,8 +129,7 @@ def jam(**options: object) -> int:
 
 
 @click.command(
-    short_help="Bound the live load at which blocks give way.",
-    epilog="""\b
+    short_help="Bound the live load at which blocks give way.", epilog="""\b
 Examples:
   amontons collapse example:column --live 1,0           sideways, in parts of its weight
   amontons collapse example:column --traction "row 5 block 1.top=1,0"
@@ -168,8 +163,7 @@ def collapse(**options: object) -> int:
 
 
 @click.command(
-    short_help="Find the complex modes of a sliding state.",
-    epilog="""\b
+    short_help="Find the complex modes of a sliding state.", epilog="""\b
 Examples:
   amontons modes case.toml --count 20 --picture modes.png
   amontons modes case.toml --velocity 1,0 --flutter     the lower side slides along x everywhere
