@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 import amontons as am
+from amontons.analysis.audit import questions
 from amontons.core.errors import InvalidInput, UnsupportedForm
 
 YOUNG = 1000.0
@@ -105,6 +106,26 @@ def test_a_soft_contact_is_wrong_for_hard_contact_and_right_by_its_own_law():
     assert numbers["share"] > 0.1 and numbers["share_by_deck_law"] < 1e-6
     depth = (soft.pressure / (2 * YOUNG)).max()
     assert numbers["deepest"] == pytest.approx(depth, rel=0.2)
+
+
+def test_a_node_without_load_that_overlaps_is_said(solved):
+    seen = am.audit(solved.model, solved).pairs[0].seen[0]
+    node = seen.side.node[0]
+    idle = replace(seen, pressed=seen.side.node != node, deepest=0.5, deepest_node=int(node))
+    found = questions.penetration((idle,), 1.0, 1.0, 1.0, str, deck=False)
+    assert found.verdict.value == "right"
+    assert f"node {node} carries no load, and overlaps by 0.5 of that" in found.text
+    carries = replace(idle, pressed=seen.side.node == node)
+    text = questions.penetration((carries,), 1.0, 1.0, 1.0, str, deck=False).text
+    assert "carries no load" not in text
+
+
+def test_questions_to_pairs_have_words_where_there_are_no_pairs():
+    body = am.Body(am.box((2, 1), (2, 1)), am.LinearElastic(1000.0, 0.3))
+    model = am.Model([body], [am.Fix("left", 0)], loads=[am.Traction("right", (0.0, -1.0))])
+    found = am.audit(model, am.solve(model).displacement)
+    assert found.is_right
+    assert all(each.text for each in found.findings.values())
 
 
 def test_friction_of_another_coefficient_is_wrong(solved):

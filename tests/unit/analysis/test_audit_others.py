@@ -7,6 +7,7 @@ import subprocess
 from dataclasses import replace
 
 import pytest
+from bar_deck import bar_deck, node
 from click.testing import CliRunner
 
 import amontons as am
@@ -91,6 +92,29 @@ CASES = [(order, law) for order in (1, 2) for law in LAWS if order == 1 or "mu" 
 def test_what_calculix_says_of_blocks_is_right(order, law, tmp_path):
     found = audited_of_calculix(stacked(order=order, **law), tmp_path, "frd", penalty=1e6)
     assert found.verdict == "right", str(found)
+
+
+LOADED = ("*BOUNDARY\nBOT, 1, 3\n*STEP\n*STATIC\n1., 1.\n*CLOAD\n"
+          "{1}, 1, {{0}}\n{5}, 3, -{{0}}\n*NODE FILE\nU\n*END STEP\n")  # fmt: skip
+
+
+@CALCULIX
+@pytest.mark.parametrize("kind", ["PLANE, {0}, {2}, {6}, {8}, {4}", "STRAIGHT, {0}, {2}, {1}",
+                                  "BEAM, {3}, {8}"])  # fmt: skip
+def test_constraints_that_turn_with_their_nodes_are_not_called_wrong(kind, tmp_path):
+    """CalculiX takes NLGEOM with these *MPC; half the load is another answer, and wrong."""
+    top = [node(i, j, 4, upper=True) for j in range(3) for i in range(3)]
+    ties = f"*MPC\n{kind.format(*top)}\n"
+    for name, size in (("model", 0.03), ("small", 0.02), ("far", 3.0)):
+        text = bar_deck(ties, LOADED.format(*top).format(size))
+        (tmp_path / f"{name}.inp").write_text(text)
+        subprocess.run(["ccx", name], cwd=tmp_path, capture_output=True, check=True)
+    found = am.audit(tmp_path / "model.inp", tmp_path / "model.frd")
+    assert found.verdict == "right", str(found)
+    assert am.audit(tmp_path / "model.inp", tmp_path / "small.frd").verdict == "wrong"
+    far = am.audit(tmp_path / "far.inp", tmp_path / "far.frd")
+    assert far.findings["balance"].verdict.value == "undecided"
+    assert "turning" in far.findings["balance"].text
 
 
 def audited_of_calculix(model: am.Model, folder, suffix: str, penalty: float) -> am.Audit:

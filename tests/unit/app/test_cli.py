@@ -29,6 +29,13 @@ def run(*arguments):
     return CliRunner().invoke(main, [str(a) for a in arguments])
 
 
+def test_the_list_of_commands_has_whole_sentences():
+    commands = run("--help").stdout.partition("Commands:")[2].partition("Examples:")[0]
+    lines = [line for line in commands.splitlines() if line.strip()]
+    assert len(lines) == len(main.commands)
+    assert all(line.endswith(".") and not line.endswith("..") for line in lines)
+
+
 def test_solve_writes_everything(folder):
     result = run("solve", "tower.hdf5")
     assert result.exit_code == 0

@@ -90,7 +90,7 @@ def test_a_load_that_comes_later(tmp_path, delay, factors):
 @pytest.mark.parametrize(
     ("old", "new", "words"),
     [
-        ("*CLOAD\n", "*CLOAD, LOAD CASE=2\n", r":30: \*CLOAD: LOADCASE.*imaginary"),
+        ("*CLOAD\n", "*CLOAD, LOAD CASE=2\n", r":30: \*CLOAD: LOAD CASE.*imaginary"),
         ("*STEP\n", "*STEP, PERTURBATION\n", r"\*STEP.*PERTURBATION.*step before"),
         ("*STATIC\n", "*STATIC, RIKS\n", "RIKS.*with the state"),
         ("*ELASTIC\n", "*ELASTIC, DEPENDENCIES=1\n", r":13: \*ELASTIC.*DEPENDENCIES"),

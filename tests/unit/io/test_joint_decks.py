@@ -189,3 +189,14 @@ def test_wrong_cards_are_told(tmp_path, model, loads, words):
 
     with pytest.raises(am.AmontonsError, match=words):
         solve()
+
+
+@pytest.mark.parametrize(("card", "words"), [
+    ("*STEP, INC=abc", r"bar.inp:\d+: \*STEP: INC: expected a number, got 'abc'"),
+    ("*STEP, INC=1.5", r"\*STEP: INC: expected a whole number, got '1.5'"),
+    ("*STEP\n*STATIC, FACTOR=x", r"\*STATIC: FACTOR: expected a number, got 'x'"),
+    ("*STEP\n*CONTACTPAIRS", r"did you mean \*CONTACT PAIR\?"),
+])  # fmt: skip
+def test_slips_in_what_says_nothing_are_told(tmp_path, card, words):
+    with pytest.raises(am.AmontonsError, match=words):
+        case_of(tmp_path, HELD, step(f"{TOP[4]}, 1, 3.").replace("*STEP", card))

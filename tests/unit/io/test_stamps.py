@@ -117,6 +117,15 @@ def test_energies_without_any_work_are_drawn_without_a_warning(contact, scale):
     assert figure.axes[1].get_yscale() == scale
 
 
+@pytest.mark.parametrize(("contact", "words"), [
+    (2e-11, "creates no energy beyond the solve's error"), (1e-3, "Contact creates energy"),
+    (-0.5, "creates no energy: largest"),
+])  # fmt: skip
+def test_energy_that_contact_gains_within_the_tolerance_is_no_alarm(contact, words):
+    steps = [Energies(contact=contact, loads=1.0, gain=1.0 + contact)]
+    assert words in energy_figure([0.5], steps).axes[1].get_title()
+
+
 def test_a_branch_that_is_cut_off():
     model = pressed(2)
     assert "NOT FINISHED" in words_of(branch_figure(am.follow(model, max_points=2)))

@@ -8,6 +8,7 @@ contacts, seen from both sides (`sides`); they are held against the laws of hard
 from __future__ import annotations
 
 from .judge import Answer, audit_answer
+from .turning import Turning
 from .verdict import Audit, Finding, Judgement, PairAudit
 
-__all__ = ["Answer", "Audit", "Finding", "Judgement", "PairAudit", "audit_answer"]
+__all__ = ["Answer", "Audit", "Finding", "Judgement", "PairAudit", "Turning", "audit_answer"]

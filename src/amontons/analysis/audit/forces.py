@@ -8,6 +8,7 @@ moves a force by at most |K| times that.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
@@ -16,6 +17,7 @@ from numpy.typing import NDArray
 from scipy import sparse
 
 from ...mechanics.model.supports import external_load
+from .turning import Turning, straightened, turned_forces
 
 if TYPE_CHECKING:
     from ...mechanics.model import Model
@@ -31,7 +33,7 @@ class NodalForces:
     """Forces (dofs,) that contacts and supports give: K u less the loads.
 
     bound (dofs,): by how much rounding of the displacements may have moved them; large (dofs,):
-    what small strains miss, where the answer is one of large ones.  blur (dofs,): of the
+    what small strains and constraints miss of large ones.  blur (dofs,): of the
     displacements.  work: u . K u, twice the elastic energy; is_held (dofs,): supports act.
     gradient: largest one of the displacements, 0 where they are small;
     size: largest force that they need one by one.
@@ -52,11 +54,14 @@ class NodalForces:
         return self.bound + self.large
 
 
-def nodal_forces(model: Model, u: Array, blur: Array, *, large: bool) -> NodalForces:
+def nodal_forces(
+    model: Model, u: Array, blur: Array, *, large: bool, turning: Sequence[Turning] = ()
+) -> NodalForces:  # fmt: skip
     """The forces at displacements u (dofs,) of nodes, known up to blur (dofs,), both lengths.
 
-    large: the displacements are those of large strains and rotations.  What references do is
-    that which their nodes say: springs on them act on nodes too.
+    large: the displacements are those of large strains and rotations; turning:
+    constraints that turn with their nodes.  What references do is that which their nodes say:
+    springs on them act on nodes too.
     """
     parts, nodes = model.discretisation, len(u)
     load = model.load_factor * external_load(model.bodies, model.loads, parts.beside)[:nodes]
@@ -71,8 +76,12 @@ def nodal_forces(model: Model, u: Array, blur: Array, *, large: bool) -> NodalFo
     bound = sizes @ np.maximum(blur, DOUBLE * np.abs(u))
     gradient, change = 0.0, np.zeros_like(bound)
     if large:  # looks at all pairs of nodes, which takes as long as all the rest
-        points = np.concatenate([body.mesh.points for body in model.bodies])
-        gradient, change = _large(sizes, points, u)
+        gradient, change = _large(sizes, _points(model), u)
+    if turning:
+        rows = (-1, model.dimension)
+        change = change + turned_forces(
+            turning, _points(model), u.reshape(rows), (inner - load).reshape(rows)
+        ).ravel()
     return NodalForces(
         inner - load, bound, change, blur,
         float(u @ inner), held, gradient,
@@ -101,6 +110,28 @@ def allowed(model: Model, u: Array) -> Array | None:
         return None
     whole = np.concatenate([u, np.zeros(parts.dofs - len(u))])
     return parts.eliminated.nearest(whole, model.load_factor * parts.prescribed)
+
+
+def misplaced(
+    model: Model, u: Array, blur: Array, turning: Sequence[Turning] = ()
+) -> tuple[float, int]:  # fmt: skip
+    """How far held dofs are from what supports and constraints ask, over the largest; node."""
+    parts = model.discretisation
+    wanted = (model.load_factor * parts.prescribed)[: len(u)]
+    size = max(float(np.abs(u).max(initial=0.0)), float(np.abs(wanted).max(initial=0.0)))
+    off = np.where(parts.is_fixed[: len(u)], np.abs(u - wanted) - 2 * blur, 0.0)
+    if turning:
+        u = straightened(turning, _points(model), u.reshape(-1, model.dimension)).ravel()
+    near = allowed(model, u)
+    if near is not None:
+        tied = parts.held[parts.held < len(u)]
+        off[tied] = np.maximum(off[tied], np.abs(u - near[: len(u)])[tied] - 4 * blur.max())
+    worst = int(off.argmax()) if len(off) else 0
+    return (float(max(off[worst], 0.0)) / size if size > 0 else 0.0), worst // model.dimension
+
+
+def _points(model: Model) -> Array:
+    return np.concatenate([body.mesh.points for body in model.bodies])
 
 
 def _large(sizes: sparse.csr_array, points: Array, u: Array) -> tuple[float, Array]:

@@ -18,9 +18,10 @@ from ...problem.friction import FrictionProblem
 from . import questions
 from .action import between_sides
 from .culprit import culprits
-from .forces import NodalForces, allowed, nodal_forces
+from .forces import NodalForces, misplaced, nodal_forces
 from .laws import Give, Seen, approach_of, seen
 from .sides import Side, sides_of
+from .turning import Turning
 from .verdict import QUESTIONS, RIGHT, UNDECIDED, WRONG, Audit, Finding, PairAudit, joined
 
 if TYPE_CHECKING:
@@ -47,6 +48,7 @@ class Answer:
     elements formulated otherwise, in words; time, until: of the answer and of the end.
     names (nodes,): what its nodes are called.  tolerance: imbalance, over the largest nodal
     force, that another formulation explains.  one_way: loads grow along one straight way.
+    turning: constraints that turn with their nodes.
     """
 
     displacement: tuple[Array, ...]
@@ -61,6 +63,7 @@ class Answer:
     one_way: bool = True
     tolerance: float = 0.0
     notes: tuple[str, ...] = field(default=())
+    turning: tuple[Turning, ...] = ()
 
 
 def audit_answer(model: Model, answer: Answer, *, deck_law: bool = True) -> Audit:
@@ -75,7 +78,7 @@ def audit_answer(model: Model, answer: Answer, *, deck_law: bool = True) -> Audi
             "configuration; for others `solution.convergence` is the judge's word"
         )
     u, blur = _whole(model, answer.displacement), _blur(model, answer)
-    forces = nodal_forces(model, u, blur, large=answer.large)
+    forces = nodal_forces(model, u, blur, large=answer.large, turning=answer.turning)
     scale = _scale(model, forces)
     idle = max(scale, float(forces.known.max(initial=0.0))) <= ZERO * forces.size
     least = forces.size if idle else scale  # of what loads pairs; sums of nothing are rounding
@@ -113,6 +116,10 @@ def _notes(answer: Answer, forces: NodalForces) -> tuple[str, ...]:
             "large strains there, small ones here: displacements change by up to "
             f"{forces.gradient:.2g} of a length, which bounds what forces can tell"
         )
+    if answer.turning:
+        notes.append("*MPC turns with its nodes there (CalculiX takes NLGEOM with it), and is "
+                     "linear here: displacements of its nodes may differ by that turning"
+                     )  # fmt: skip
     notes += [f"{text}: their forces are only bounded" for text in answer.other]
     return tuple(notes)
 
@@ -182,7 +189,7 @@ def _balance(
     u, scale = state
     left = np.where(off, np.abs(forces.missing), 0.0)
     over = np.where(off, left - forces.known, 0.0)
-    moved, at = _misplaced(model, u, forces.blur)
+    moved, at = misplaced(model, u, forces.blur, answer.turning)
     if scale <= ZERO * forces.size and moved <= PLACED:
         names = ("residual", "excess", "bound", "largest_force", "between_sides", "supports")
         return Finding(RIGHT, "no forces at all", dict.fromkeys(names, 0.0))
@@ -213,8 +220,13 @@ def _balance(
         text = f"the forces on both sides of pair {pair} differ by {between:.2g} of its force"
         return Finding(WRONG, text, numbers)
     if bound > BLIND:
-        text = (f"rounding of the displacements may move nodal forces by {bound:.2g} of the "
-                "largest: the balance can not be told; give more digits")  # fmt: skip
+        is_turned = forces.large.max(initial=0.0) > forces.bound.max(initial=0.0)
+        what, remedy = (
+            ("turning of bodies or constraints", "small strains do not know it") if is_turned
+            else ("rounding of the displacements", "give more digits")
+        )  # fmt: skip
+        text = (f"{what} may move nodal forces by {bound:.2g} of the largest: the balance can "
+                f"not be told; {remedy}")  # fmt: skip
         return Finding(UNDECIDED, text, numbers)
     return Finding(RIGHT, f"holds to {residual:.1e} of the largest nodal force (rounding may "
                    f"hide {bound:.1e})", numbers)  # fmt: skip
@@ -239,20 +251,6 @@ def _unbalanced(
                  f"{share:.1%} of it")  # fmt: skip
         nodes = tuple(dict.fromkeys([*(name(each[0]) for each in alone), *nodes]))
     return Finding(WRONG, text, numbers, nodes)
-
-
-def _misplaced(model: Model, u: Array, blur: Array) -> tuple[float, int]:
-    """How far held dofs are from what supports and constraints ask, over the largest; node."""
-    parts = model.discretisation
-    wanted = (model.load_factor * parts.prescribed)[: len(u)]
-    size = max(float(np.abs(u).max(initial=0.0)), float(np.abs(wanted).max(initial=0.0)))
-    off = np.where(parts.is_fixed[: len(u)], np.abs(u - wanted) - 2 * blur, 0.0)
-    near = allowed(model, u)
-    if near is not None:
-        tied = parts.held[parts.held < len(u)]
-        off[tied] = np.maximum(off[tied], np.abs(u - near[: len(u)])[tied] - 4 * blur.max())
-    worst = int(off.argmax()) if len(off) else 0
-    return (float(max(off[worst], 0.0)) / size if size > 0 else 0.0), worst // model.dimension
 
 
 # ------------------------------------------------------------------------------ pairs
@@ -388,7 +386,8 @@ def _time(time: float, until: float) -> Finding:
 
 def _only_bounded(name: str, found: Finding) -> Finding:
     """Forces of elements formulated otherwise say neither right nor wrong."""
-    if name in ("penetration", "time", "geometry") or found.verdict is UNDECIDED:
+    is_known = name in ("penetration", "time", "geometry") or not found.numbers  # or no pairs
+    if is_known or found.verdict is UNDECIDED:
         return found
     return Finding(UNDECIDED, "not known, forces of these elements are only bounded; " +
                    found.text, found.numbers, found.nodes)  # fmt: skip

@@ -54,12 +54,21 @@ def penetration(seen: tuple[Seen, ...], approach: float, element: float, moved: 
         "largest displacement"
     )  # fmt: skip
     text += f"; gaps where contact presses are {max(shares):.2g} of what contact closes"
+    if not wrong and depth > OVERLAP * approach and _carries_nothing(deepest):
+        text += (f"; node {hit} carries no load, and overlaps by {depth / approach:.2g} of "
+                 "that: only gaps where contact presses count, and area that lies a quarter "
+                 f"of it inside, here {inside:.1%}")  # fmt: skip
     if wrong and not deck and own < 0.5 * min(shares):
         text += (f", of which the deck's own stiffness explains {1 - own / min(shares):.0%}: "
                  "a hard contact would not give way like that")  # fmt: skip
     if max(one.blurred for one in seen) > OVERLAP and not wrong:
         return Finding(UNDECIDED, "displacements have too few digits to tell gaps", numbers)
     return Finding(WRONG if wrong else RIGHT, text, numbers, (hit,) if wrong and hit else ())
+
+
+def _carries_nothing(one: Seen) -> bool:
+    """Whether the node that overlaps most is none of those that are pressed."""
+    return not one.pressed[one.side.node == one.deepest_node].any()
 
 
 def _inside(seen: tuple[Seen, ...], *, deck: bool) -> float:

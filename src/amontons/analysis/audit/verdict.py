@@ -163,6 +163,8 @@ def worst(verdicts: Any) -> Judgement:
 
 def joined(found: list[Finding], names: list[str]) -> Finding:
     """The finding of all pairs: the texts of those that are as bad as the worst."""
+    if not found:
+        return Finding(RIGHT, "there are no contact pairs")
     verdict = worst(f.verdict for f in found)
     chosen = [k for k, f in enumerate(found) if f.verdict is verdict]
     several = len(found) > 1

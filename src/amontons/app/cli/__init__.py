@@ -91,7 +91,7 @@ def solve(**options: object) -> int:
 
 
 @main.command(
-    epilog="""\b
+    short_help="Say what a problem is, and which methods fit.", epilog="""\b
 Examples:
   amontons info part.step --picture faces.png      which face has which name
   amontons info case.toml --json - | jq .contacts
@@ -121,7 +121,7 @@ def info(**options: object) -> None:
 
 
 @main.command(
-    epilog="""\b
+    short_help="Compare methods on many problems.", epilog="""\b
 Examples:
   amontons bench *.hdf5 --methods gauss-seidel,auto --tolerances 1e-3,1e-6 --profile p.png
   amontons bench *.hdf5 --methods semismooth-newton:function=natural-map,line_search=none
@@ -163,7 +163,7 @@ def bench(**options: object) -> None:
 
 @main.command(
     "enumerate",
-    epilog="""\b
+    short_help="Find all solutions, and prove that these are all.", epilog="""\b
 Examples:
   amontons enumerate example:hild             three solutions, and proof that there is no other
   amontons enumerate example:brake --picture brake.png
@@ -202,7 +202,7 @@ def enumerate_solutions(**options: object) -> int:
 
 
 @main.command(
-    epilog="""\b
+    short_help="Find which solution each method finds.", epilog="""\b
 Examples:
   amontons basins example:hild --mu 3.5 --methods uzawa,semismooth-newton
   amontons basins example:brake --methods uzawa --parameter rho=0.1,1,10 --picture brake.png
@@ -260,7 +260,7 @@ def basins(**options: object) -> int:
 
 
 @main.command(
-    epilog="""\b
+    short_help="Say whether a problem has one solution.", epilog="""\b
 Examples:
   amontons uniqueness example:hild            another solution, and the critical friction
   amontons uniqueness example:hild --mu 1     one solution, whatever the load
@@ -295,7 +295,7 @@ def uniqueness(**options: object) -> int:
 
 
 @main.command(
-    epilog="""\b
+    short_help="Follow the solutions while load or friction changes.", epilog="""\b
 Examples:
   amontons follow example:vee                     two folds, three solutions between them
   amontons follow example:vee --all --mu 2

@@ -9,7 +9,7 @@ from .folders import results_folder
 
 
 @click.command(
-    epilog="""\b
+    short_help="Say whether a contact result is true.", epilog="""\b
 Examples:
   amontons audit model.inp model.frd                  is the result of CalculiX true?
   amontons audit model.inp model.frd --solve --report -o model-audit
@@ -50,7 +50,7 @@ def audit(**options: object) -> int:
 
 
 @click.command(
-    epilog="""\b
+    short_help="Write a problem, model or result in other formats.", epilog="""\b
 Examples:
   amontons convert global.hdf5 local.hdf5 --form local
   amontons convert case.toml problem.hdf5
@@ -82,7 +82,7 @@ def convert(**options: object) -> None:
 
 
 @click.command(
-    epilog="""\b
+    short_help="Check a certificate of uniqueness.", epilog="""\b
 Examples:
   amontons uniqueness example:hild --mu 1 --certificate c.h5
   amontons check c.h5
@@ -100,7 +100,7 @@ def check(certificate: str) -> int:
 
 
 @click.command(
-    epilog="""\b
+    short_help="Find the least friction that locks in a state.", epilog="""\b
 Examples:
   amontons jam example:brake                  from which friction on the arm can stay locked
   amontons jam case.toml --json - | jq .upper
@@ -129,7 +129,7 @@ def jam(**options: object) -> int:
 
 
 @click.command(
-    epilog="""\b
+    short_help="Bound the live load at which blocks give way.", epilog="""\b
 Examples:
   amontons collapse example:column --live 1,0           sideways, in parts of its weight
   amontons collapse example:column --traction "row 5 block 1.top=1,0"
@@ -163,7 +163,7 @@ def collapse(**options: object) -> int:
 
 
 @click.command(
-    epilog="""\b
+    short_help="Find the complex modes of a sliding state.", epilog="""\b
 Examples:
   amontons modes case.toml --count 20 --picture modes.png
   amontons modes case.toml --velocity 1,0 --flutter     the lower side slides along x everywhere
@@ -198,7 +198,7 @@ def modes(**options: object) -> int:
     return run(**options)  # type: ignore[arg-type]
 
 
-@click.command()
+@click.command(short_help="List the built-in examples.")
 def examples() -> None:
     """List the built-in examples: `amontons solve example:NAME`, in time `amontons run`."""
     from .sources import list_examples

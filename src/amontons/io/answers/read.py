@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ...analysis.audit import Answer
+from ...analysis.audit import Answer, Turning
 from ...core.errors import FileFormatError
 from ..readers import Case
 from . import dat, frd
@@ -94,6 +94,7 @@ def _model_and_answer(
         answer, large=about.large, other=about.other, time=table.time,
         until=None if wanted is not None else until, names=about.labels.astype(str),
         one_way=about.one_way, tolerance=EXPANDED.get(about.plane, 0.0),
+        turning=() if about.plane else tuple(Turning(*tie) for tie in about.turning),
     )  # fmt: skip
 
 

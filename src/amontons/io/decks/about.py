@@ -14,6 +14,7 @@ from .course import Course
 from .flat import Deck
 from .history import History
 from .large import is_large
+from .mpc import turning_mpcs
 from .scopes import Index
 from .shapes import SHAPES
 from .stages import Held
@@ -29,9 +30,10 @@ class About:
     """labels (nodes,): numbers of the mesh's nodes in the deck; are_unique: no two alike.
 
     plane: "", "strain", "stress" or "axisymmetric"; other: types of elements that are
-    formulated otherwise, in words; large: NLGEOM; until: the end of the last step; one_way: all
+    formulated otherwise, in words; large: NLGEOM, or *MPC
+    with which CalculiX takes it; until: the end of the last step; one_way: all
     loads grow in proportion; at: the model at a time.  cells: numbers (k,) of elements in the
-    deck and their nodes (k, n) in the mesh.
+    deck and their nodes (k, n) in the mesh.  turning: types of nonlinear *MPC, and their nodes.
     """
 
     labels: Index
@@ -43,6 +45,7 @@ class About:
     one_way: bool
     at: Callable[[float], Model]
     cells: tuple[tuple[Index, Index], ...]
+    turning: tuple[tuple[str, Index], ...]
 
     @classmethod
     def of(
@@ -62,11 +65,14 @@ class About:
         courses = [*history.supports.courses, *history.forces.courses]
         courses += [course for course, _, _ in history.faces.values()]
         courses += [course for course, _, _, _ in history.bodies.values()]
+        turning = tuple(turning_mpcs(deck, numbers))  # with one CalculiX takes NLGEOM
+        plane = SHAPES[deck.blocks[0].kind].plane
         return cls(
-            own, len(np.unique(own)) == len(own), SHAPES[deck.blocks[0].kind].plane, other,
-            is_large(deck), history.until, 
+            own, len(np.unique(own)) == len(own), plane, other,
+            is_large(deck) or bool(turning), history.until,
             len(stages) == 1 and all(_is_ramp(c, history.until) for c in courses),
             partial(_at, tuple(stages), make), _cells(deck, numbers),
+            turning,
         )  # fmt: skip
 
 

@@ -20,6 +20,7 @@ from .cards import Card, Row, number
 from .flat import Deck, Placed
 from .materials import Interaction
 from .meshing import Region
+from .options import spelled
 from .scopes import Analytic, Index, missing
 from .tools import Tool, obstacle_of
 
@@ -146,7 +147,7 @@ def _ties(placed: Placed, region: Region) -> list[Pair]:
     card = placed.card
     for option in ("CYCLICSYMMETRY", "MULTISTAGE", "FLUIDPERIODIC"):
         if option in card.options:
-            raise card.error(f"{option}: is not read")
+            raise card.error(f"{spelled(option)}: is not read")
     out = []
     for row in card.rows():
         names = [text for text in row.fields if text]

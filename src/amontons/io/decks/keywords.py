@@ -10,7 +10,7 @@ from collections.abc import Iterable, Sequence
 from difflib import get_close_matches
 
 from .cards import Card
-from .options import with_known_options
+from .options import spelled, with_known_options
 
 READ = {
     "HEADING", "MATERIAL", "ELASTIC", "HYPERELASTIC", "PLASTIC", "DENSITY", "SOLIDSECTION",
@@ -124,7 +124,7 @@ def _would(key: str) -> str:
 def _meant(key: str) -> str:
     """What a keyword may be a slip of the pen for; none that exists is so near another."""
     close = [] if key in MEANS else get_close_matches(key, READ, 1, SLIP)
-    return f"; did you mean *{close[0]}?" if close else ""
+    return f"; did you mean *{spelled(close[0])}?" if close else ""
 
 
 def _is_first_temperature(card: Card) -> bool:

@@ -21,6 +21,7 @@ from .elastic import (
     read_orientations,
 )
 from .flat import Deck, Placed
+from .options import spelled
 from .rubber import rubber
 from .scopes import Index, missing
 
@@ -171,7 +172,7 @@ def _behaviour(interaction: Interaction, card: Card) -> None:
 def _friction(interaction: Interaction, card: Card) -> None:
     for option in ("USER", "EXPONENTIALDECAY", "ROUGH", "LAGRANGE"):
         if option in card.options and option != "LAGRANGE":
-            raise card.error(f"{option}: is not read, expected a coefficient")
+            raise card.error(f"{spelled(option)}: is not read, expected a coefficient")
     rows = list(card.rows())
     if len(rows) != 1:
         raise card.error(f"expected one line with a coefficient, got {len(rows)}")

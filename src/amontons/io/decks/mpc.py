@@ -7,6 +7,8 @@ the line between the two others.
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -17,11 +19,32 @@ Array = NDArray[np.float64]
 Index = NDArray[np.int64]
 Raw = tuple[Index, int, float]
 FLAT = 1e-9  # sine of an angle that is none
-TYPES = ("PLANE", "STRAIGHT", "BEAM", "TIE", "LINEAR")
+TURNING = ("PLANE", "STRAIGHT", "BEAM")  # elsewhere nonlinear: about the moved nodes
+TYPES = (*TURNING, "TIE", "LINEAR")
 
 
 def mpc_equations(deck: Deck, placed: Placed) -> list[tuple[list[Raw], Card]]:
     """The equations of a card; raises FileFormatError for other types and wrong nodes."""
+    kind, nodes, row = _read(placed)
+    found = MAKERS[kind](deck.points, nodes, row)
+    return [([term for term in terms if term[2]], placed.card) for terms in found]
+
+
+def turning_mpcs(deck: Deck, numbers: Index) -> Iterator[tuple[str, Index]]:
+    """Types of cards that turn with their nodes, and these nodes' numbers in the mesh.
+
+    numbers: of the deck's nodes in the mesh, -1 for one without elements, which has no results.
+    """
+    for placed in deck.model:
+        if placed.card.keyword == "MPC":
+            kind, nodes, _ = _read(placed)
+            known = numbers[nodes]
+            if kind in TURNING and (known >= 0).all():
+                yield kind, known
+
+
+def _read(placed: Placed) -> tuple[str, Index, Row]:
+    """Type, nodes of the deck and first line of a card, checked."""
     card = placed.card
     rows = [row for row in card.rows() if any(row.fields)]
     if not rows:
@@ -35,8 +58,7 @@ def mpc_equations(deck: Deck, placed: Placed) -> list[tuple[list[Raw], Card]]:
     least = {"PLANE": 4, "STRAIGHT": 3, "LINEAR": 3}.get(kind, 2)
     if len(nodes) < least or (kind in ("BEAM", "TIE") and len(nodes) != 2):
         raise rows[0].error(f"*MPC {kind}: expected {least} nodes, got {len(nodes)}")
-    found = MAKERS[kind](deck.points, nodes, rows[0])
-    return [([term for term in terms if term[2]], card) for terms in found]
+    return kind, nodes, rows[0]
 
 
 def _one(node: int, component: int, factor: float) -> Raw:

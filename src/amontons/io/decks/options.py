@@ -10,7 +10,7 @@ from __future__ import annotations
 from collections.abc import Collection
 from dataclasses import replace
 
-from .cards import Card
+from .cards import Card, Row, number, whole
 
 SHORTEST = 3  # letters that an option may be cut to
 ANYWHERE = {"INPUT"}  # another file with the data
@@ -76,6 +76,20 @@ NOTHING = {  # values that say what is so anyway
     ("DENSITY", "DEPENDENCIES"): "0", ("EXPANSION", "DEPENDENCIES"): "0",
     ("STEP", "PERTURBATION"): "NO",
 }  # fmt: skip
+NUMBERS = {  # options that are numbers and say nothing here: others are slips all the same
+    "STEP": "INC INCF", "STATIC": "STABILIZE ALLSDTOL FACTOR", "NSET": "FREQUENCY",
+    "MATERIAL": "RTOL SRATEFACTOR", "SPRING": "RTOL", "FRICTION": "SLIPTOLERANCE",
+    "CONTACTPAIR": "EXTENSIONZONE HCRIT SMOOTH", "TIE": "CONSTRAINTRATIO",
+    "EXPANSION": "ZERO", "SURFACE": "FILLETRADIUS",
+}  # fmt: skip
+WHOLE = {"INC", "INCF", "FREQUENCY"}  # those that count
+SPELLED = {name.replace(" ", ""): name for name in (
+    "EXPONENTIAL DECAY", "CYCLIC SYMMETRY", "FLUID PERIODIC", "MASS FLOW",
+    "CONTACT PAIR", "CONTACT INCLUSIONS", "CONTACT EXCLUSIONS", "CONTACT PROPERTY ASSIGNMENT",
+    "SOLID SECTION", "SURFACE INTERACTION", "SURFACE BEHAVIOR", "RIGID BODY",
+    "PRE-TENSION SECTION", "CHANGE FRICTION", "CHANGE SURFACE BEHAVIOR", "MODEL CHANGE",
+    "INITIAL CONDITIONS", "LOAD CASE", "WEIGHTING METHOD",
+)}  # fmt: skip
 MEANS = {
     "DEPENDENCIES": "the property would depend on fields",
     "LOADCASE": "the load would be the imaginary part of another",
@@ -91,7 +105,10 @@ def with_known_options(card: Card, allowed: Collection[str], notes: list[str]) -
     Raises FileFormatError for one that is not read.  notes: gets what is left out.
     """
     known = KNOWN.get(card.keyword)
-    if known is None or known.issuperset(card.options):
+    if known is None:
+        return card
+    if known.issuperset(card.options):
+        _check_numbers(card)
         return card
     options = {}
     for option, value in card.options.items():
@@ -106,7 +123,22 @@ def with_known_options(card: Card, allowed: Collection[str], notes: list[str]) -
         elif value.upper() != NOTHING.get((card.keyword, option)):
             would = f" ({MEANS[option]})" if option in MEANS else ""
             raise card.error(
-                f"{option}: is not read and may change the answer{would}; "
+                f"{spelled(option)}: is not read and may change the answer{would}; "
                 f"--allow {card.keyword}.{option} goes on without it"
             )
-    return replace(card, options=options)
+    card = replace(card, options=options)
+    _check_numbers(card)
+    return card
+
+
+def _check_numbers(card: Card) -> None:
+    """Raise FileFormatError for a number that is none."""
+    for option in NUMBERS.get(card.keyword, "").split():
+        if card.options.get(option):
+            read = whole if option in WHOLE else number
+            read(card.options[option], Row(card.file, card.number, []), f"{card}: {option}")
+
+
+def spelled(word: str) -> str:
+    """A keyword or option as manuals write it, with its blanks."""
+    return SPELLED.get(word, word)

@@ -11,11 +11,11 @@ from numpy.typing import NDArray
 
 from ...core.errors import InvalidInput
 from ...mechanics.steps import Energies
+from ...mechanics.steps.energy import TOLERATED
 from .layout import SMALL, Sheet
 from .style import INK, UNKNOWN, Units, with_unit
 
 Array = NDArray[np.float64]
-ROUNDING = 1e-12  # work of contact that says nothing, relative to all that was put in
 
 
 def energy_figure(
@@ -57,12 +57,14 @@ def energy_figure(
     work = np.array([e.contact for e in energies])
     defect = np.abs([e.defect for e in energies])
     right.plot(t, np.maximum(-work, 0), color="#E69F00", label="dissipated by contact")
-    gained = work > ROUNDING * max(np.abs(put_in).max(), np.abs(work).max())
+    most = max(np.abs(put_in).max(), max(e.turnover for e in energies))
+    gained = work > TOLERATED * most  # below it is what the solve leaves
     if gained.any():
         right.plot(t[gained], work[gained], "x", color="#D55E00", label="gained from contact")
     right.plot(t, defect, color=INK, linewidth=0.8, label="|defect of the balance|")
     largest = f"{work.max():.1e} {units.energy}".rstrip()
-    told = f"Contact never creates energy: largest work {largest}"
+    beyond = " beyond the solve's error" if work.max() > 0 else ""
+    told = f"Contact creates no energy{beyond}: largest work {largest}"
     if gained.any():
         whole = f"{np.abs(put_in).max():.2g} {units.energy}".rstrip()
         told = f"Contact creates energy: at most {largest} in a step,\nof {whole} put in so far"

@@ -154,10 +154,10 @@ def materials_by_region(
         return dict.fromkeys(mesh.regions, material)
     for region in material:
         if region not in mesh.regions:
-            raise InvalidInput("material: " + unknown("region", region, mesh.regions))
+            raise InvalidInput(unknown("region", region, mesh.regions), (), "material")
     missing = [region for region in mesh.regions if region not in material]
     if missing:
-        raise InvalidInput(f"material: expected one for region {missing[0]!r}, got none")
+        raise InvalidInput(f"expected one for region {missing[0]!r}, got none", (), "material")
     return dict(material)
 
 
