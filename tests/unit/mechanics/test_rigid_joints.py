@@ -109,6 +109,22 @@ def test_what_joints_lose_by_long_steps_is_of_third_order_and_told():
     assert lost[0] > 5 * lost[1]  # contacts of the guide are of first order
 
 
+@pytest.mark.parametrize(("turning", "told"), [(300.0, True), (60.0, False)])
+def test_spin_about_an_axis_of_symmetry_does_not_hide_what_joints_lose(turning, told):
+    """A leaning gyroscope on a point: its nod is of far less energy than its spin."""
+    R = np.array([[1, 0, 0], [0, np.cos(1.2), -np.sin(1.2)], [0, np.sin(1.2), np.cos(1.2)]])
+    body = RigidBody(cuboid((0.4, 0.4, 0.02)), 1000, 0.3 * R[:, 2],
+                     (np.cos(0.6), np.sin(0.6), 0, 0), spin=turning * R[:, 2])  # fmt: skip
+    steps = run(RigidBodies([body], joints=[Joint(0, GROUND, (0, 0, 0))]), 1e-3, 0.1)
+    assert any(s.warnings for s in steps) == told
+
+
+def test_a_body_is_not_apart_from_itself():
+    body = RigidBody(cuboid((1, 1, 1)))
+    with pytest.raises(am.InvalidInput, match="apart"):
+        RigidBodies([body, body], apart=[(0, 0)])
+
+
 @pytest.mark.parametrize(
     ("step", "options", "ground"),
     [(1e-3, {}, {}), (2.5e-4, {}, {}), (2e-3, {"solver": am.Auto()}, {}),

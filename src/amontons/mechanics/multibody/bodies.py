@@ -162,7 +162,7 @@ class RigidBodies(KeepsLocks):
             self._check_joint(joint, ("joints", k))
         for k, pair in enumerate(self.apart):
             two = isinstance(pair, Sequence | np.ndarray) and len(pair) == 2
-            if not two or not all(self._is_body(number) for number in pair):
+            if not two or not all(map(self._is_body, pair)) or pair[0] == pair[1]:
                 text = f"expected two of the {len(self.bodies)} bodies, got {shown(pair)}"
                 raise InvalidInput(text, ("apart", k))
 

@@ -31,11 +31,13 @@ from scipy.sparse.linalg import SuperLU, splu
 
 from .bodies import GROUND, RigidBodies
 from .rows import Rows, impulses, levers_of, rotations, velocities
+from .states import Motion
 
 Array = NDArray[np.float64]
 Index = NDArray[np.int64]
 SMALL = 1e-12  # e over the mean of the diagonal of W_JJ
 DECIDED = 1e-9  # of |g|^2: what is left of a contact that joints decide; SMALL is in it
+ALIKE = 1e-6  # of the largest principal moment of inertia, moments of an axis of symmetry
 AT_ONCE = 64  # contacts whose X are formed together, dense
 
 
@@ -97,6 +99,12 @@ class Joints:
         own = np.einsum("jki,jk->ji", R[first], point - x[first])
         other = np.einsum("jki,jk->ji", R[second], point - x[second])
         self.anchors = own, np.where(on_ground[:, None], point, other)
+        self.crosswise = np.array([_crosswise(np.array(body.inertia)) for body in bodies])
+
+    def energy(self, motion: Motion) -> float:
+        """Kinetic energy without that of spin about axes of symmetry, which joints leave."""
+        turning = np.einsum("bi,bij,bj->", motion.spin, self.crosswise, motion.spin)
+        return 0.5 * float(self.masses @ (motion.velocity**2).sum(axis=1) + turning)
 
     def rows(self, x: Array, R: Array) -> tuple[Rows, Array]:
         """Rows of joints of bodies at x, turned by R, and how far sides are apart, (k, 3)."""
@@ -150,6 +158,14 @@ class Joints:
             slides = _left(tangents, (G @ tangents.T).tocsc(), factors).reshape(-1, 2)
             idle[idle] = ~slides.any(axis=1)
         return Hung(shared, factors, loose, idle)
+
+
+def _crosswise(inertia: Array) -> Array:
+    """Inertia (3, 3) without that about the axis of symmetry: none of it where all axes are."""
+    values, axes = np.linalg.eigh(inertia)
+    low, high = np.diff(values) <= ALIKE * values[-1]  # the lower two alike, the upper two
+    kept = values * [not high, not (low and high), not low]
+    return (axes * kept) @ axes.T
 
 
 def _left(rows: Any, shared: Any, factors: SuperLU) -> NDArray[np.bool_]:

@@ -228,8 +228,9 @@ class _Stepping:
         kinetic, potential, gain, contact, mending = energies
         done = RigidEnergies(kinetic, potential, gain + lost, contact, mending, taken)
         fallen = 0.5 * float(masses.sum() * (h * gravity) @ (h * gravity))
-        loss = state.loss_after(taken, kinetic, fallen, self.asked.tolerance)
         end = Motion(*motion)
+        busy = self.joints.energy(end) if self.joints is not None else kinetic
+        loss = state.loss_after(taken, busy, fallen, self.asked.tolerance)
         new = RigidState(state.index + 1, time, end, at.keys, r[:nc], moments, *loss, end)
         said = self._said_of(state, new) + self._undetermined(at)
         return RigidStep(self.system, new, at.found, at.rows.axes[:nc], r[:nc], r[nc:] + jolt,

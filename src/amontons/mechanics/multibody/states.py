@@ -19,7 +19,7 @@ from .rows import rotations
 
 Array = NDArray[np.float64]
 Index = NDArray[np.int64]
-MUCH = 0.01  # of the largest kinetic energy, lost by joints that nothing has jolted
+MUCH = 0.01  # of `fastest`, lost by joints that nothing has jolted
 
 
 class Motion(NamedTuple):
@@ -45,7 +45,7 @@ class RigidState:
     impulses: Array  # (nc, 3) theirs, in their frames
     moments: Array = field(default_factory=lambda: np.zeros((0, 3)))  # (nc, 3) or none
     lost: float = 0.0  # energy that joints took without a jolt, an error of the steps
-    fastest: float = 0.0  # the largest kinetic energy so far, or what gravity gives in a step
+    fastest: float = 0.0  # largest energy of `Joints` so far, or what gravity gives in a step
     reached: Motion | None = field(default=None, repr=False)  # by a step; others are jolted
 
     def loss_after(
@@ -53,8 +53,8 @@ class RigidState:
     ) -> tuple[float, float]:
         """`lost` and `fastest` after a step from here in which joints did this work.
 
-        kinetic: energy at its end; fallen: what gravity gives to free bodies in a step.  Bodies
-        at rest move by errors of the solves alone: slower motion than `fallen` is no scale, and
+        kinetic: energy at its end, of `Joints`; fallen: what gravity gives to free bodies in a
+        step.  Bodies at rest move by errors of the solves alone: slower motion than `fallen` is no scale, and
         a loss of `tolerance` of it no error of the step.  A motion that somebody else has given
         may be jolted, which is no error either, but leaves errors of its solve.
         """
@@ -188,7 +188,8 @@ def too_long(before: RigidState, after: RigidState, step: float) -> tuple[Result
     fast = int(np.argmax(turns))
     text = (
         f"joints have taken {100 * after.lost / after.fastest:.2g} % of the largest kinetic "
-        f"energy until t = {after.time:.4g} without a jolt, by the size of the steps "
+        "energy that is not spin about axes of symmetry "
+        f"until t = {after.time:.4g} without a jolt, by the size of the steps "
         f"(body {fast} turns by {turns[fast]:.2g} rad in this one); the loss falls with its "
         f"third power: take steps of {0.5 * step:.3g} or less"
     )
