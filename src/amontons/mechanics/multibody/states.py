@@ -54,9 +54,9 @@ class RigidState:
         """`lost` and `fastest` after a step from here in which joints did this work.
 
         kinetic: energy at its end, of `Joints`; fallen: what gravity gives to free bodies in a
-        step.  Bodies at rest move by errors of the solves alone: slower motion than `fallen` is no scale, and
-        a loss of `tolerance` of it no error of the step.  A motion that somebody else has given
-        may be jolted, which is no error either, but leaves errors of its solve.
+        step.  Bodies at rest move by errors of the solves alone: slower motion than `fallen` is
+        no scale, and a loss of `tolerance` of it no error of the step.  A motion that somebody
+        else has given may be jolted, which is no error either, but leaves errors of its solve.
         """
         if self.motion is not self.reached:
             return self.lost, max(self.fastest, kinetic, fallen, -tolerance * work)

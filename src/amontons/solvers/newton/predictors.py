@@ -69,8 +69,9 @@ def by_contact(
     from ..auto.hybrid import Auto  # which takes Newton's method, too
 
     tangent, start = _tangent_problem(problem, share, goal, v, by_factors=True)
-    is_brief = tangent.gains_energy or not problem.meets_first  # another way is next
-    most = EARLY if is_brief else CONTACT_STEPS
+    # Another way is next, or a shorter step: a body about to come loose has no such state.
+    is_last = problem.meets_first or (problem.shortest == 0 and goal - share == 1.0)
+    most = CONTACT_STEPS if is_last and not tangent.gains_energy else EARLY
 
     def states() -> Iterator[tuple[Array | None, bool]]:
         iterates = first_of(Auto().iterates(tangent, start, target), most)
