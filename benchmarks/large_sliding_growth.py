@@ -135,7 +135,7 @@ def measured(case, kinds=("press", "drag")):
 def main():
     """Measure what is asked for and write the page of all that is stored."""
     parser = argparse.ArgumentParser()
-    parser.add_argument("--fine", type=float, nargs="*", default=[1.3, 2, 3, 4.75])
+    parser.add_argument("--fine", type=float, nargs="*", default=[1.3, 2.0, 3.0, 4.75])
     parser.add_argument("--dense", action=argparse.BooleanOptionalAction, default=True)
     asked = parser.parse_args()
     measured(ironing(1))  # compiles, and makes what is made once
