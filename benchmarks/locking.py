@@ -6,6 +6,7 @@ Cells are integrated as they are by default.  Prints errors in percent against a
 """
 
 import numpy as np
+from machine import options
 
 import amontons as am
 
@@ -80,6 +81,7 @@ def row(problem, law, kind, order):
 
 
 def main():
+    options(__doc__).parse_args()
     for problem, sizes in SIZES.items():
         for law in LAWS:
             print(f"\n| {problem}, {law} | {' | '.join(map(str, sizes))} |")
