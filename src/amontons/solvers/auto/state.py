@@ -253,6 +253,7 @@ class State:
         return Iterate(r[:, : self.problem.dimension].copy())
 
 
-def chunks_alone(problem: FrictionProblem, tolerance: float) -> int:
+def chunks_alone(problem: FrictionProblem) -> int:
     """Chunks that the first track has before any other, whatever it promises."""
-    return 1 if not is_brief(problem, tolerance) and is_stacked(problem) else FIRST_CHUNKS
+    short = _is_short(len(problem.blocks.indices), problem.contacts)
+    return 1 if not short and is_stacked(problem) else FIRST_CHUNKS
