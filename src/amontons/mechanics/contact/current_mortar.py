@@ -1,11 +1,11 @@
 """Dual mortar contact of two deforming bodies where they are now.
 
 A pair has slave nodes p and a master surface.  All is taken at the positions x of all nodes:
-n_p is the unit normal at p, out of the master into the slave, the area average of the facets
-around it where they face the master, as what rises beyond a rim would tilt forces; of a node
-that faces nobody, in dynamics, of ties and under a given bound (Tresca's law) that of whole
-facets.  On every slave facet psi are the dual functions of `dual` on that part of it that
-faces the master ([PSG]), D_p = int psi_p over all facets, and
+n_p is the unit normal at p, out of the master into the slave, that of `faced_normals`: the
+area average of the facets around it where they face the master; of a node that faces nobody,
+in dynamics, of ties and under a given bound (Tresca's law) that of whole facets.  On every
+slave facet psi are the dual functions of `dual` on that part of it that faces the master
+([PSG]), D_p = int psi_p over all facets, and
 
     B_pp = 1,   B_pq = - int psi_p N_q / D_p  of master nodes q,   sum_j B_pj = 0,         (1)
     G_p = sum_j B_pj x_j,      g_p = n_p . G_p,                                             (2)
@@ -63,6 +63,7 @@ from scipy import sparse
 from ...linear.sums import sum_of_blocks, sum_of_products
 from .couples import Couples
 from .current_slopes import MortarSlopes
+from .faced_normals import FacedNormals
 from .facing import Skin, shapes
 from .fading import Fading
 from .folds import Fold
@@ -72,7 +73,6 @@ from .shared import Shared
 Array = NDArray[np.float64]
 Index = NDArray[np.int64]
 Mask = NDArray[np.bool_]
-ROUNDING = 1e-12  # of a facet: what does not face the master where all of it does
 ACROSS = 0.5  # m . n_M of (3') below which sides hardly face each other: d is zero
 
 
@@ -154,45 +154,15 @@ class MortarMeeting:
         """E of `surface_axes`, (nc, 2, 3); None for none."""
         return None if self.axes is None else (self.axes @ self.x).reshape(-1, 2, 3)
 
+    @cached_property
+    def facing(self) -> FacedNormals:
+        """What normals come from."""
+        return FacedNormals(self)
+
     @property
-    def faced(self) -> Index:
-        """Numbers in `around` of the facets of `shared`, (f,)."""
-        of = self.shared.facets
-        return of if self.pair.fold is None else self.pair.fold.halves[0][of]
-
-    @cached_property
-    def covered(self) -> Array | None:
-        """Parts of facets `around` that face the master, (f,); None: all count whole."""
-        if self.pair.areas is None:
-            return None
-        whole = np.linalg.norm(self.pair.around[0].areas(self.x), axis=1)
-        out = np.zeros(len(whole))
-        out[self.faced] = self.shared.mass.sum(axis=(1, 2)) / whole[self.faced]
-        return np.where(np.abs(out - 1) < ROUNDING, 1.0, out)
-
-    @cached_property
-    def heeded(self) -> Array:
-        """Parts (f, a) of facets `around` in the normals of their nodes."""
-        (skin, heeded), covered = self.pair.around, self.covered
-        met = np.isin(skin.nodes, [] if covered is None else self.slaves[self.met])
-        parts = np.where(met, 1.0 if covered is None else covered[:, None], 1.0)
-        return np.where(heeded, parts, 0.0)
-
-    @cached_property
-    def sums(self) -> Array:
-        """Area vectors around the slaves, into the slave, in free directions, (nc, d)."""
-        skin, heeded = self.pair.around[0], self.heeded
-        share = -skin.areas(self.x) / skin.corners[:, None]
-        out = np.zeros(self.x.shape)
-        for slot in range(skin.nodes.shape[1]):
-            np.add.at(out, skin.nodes[:, slot], share * heeded[:, slot, None])
-        return out[self.pair.slaves] * self.pair.free
-
-    @cached_property
     def normals(self) -> Array:
         """n, (nc, d); zero where all facets around have shrunk to points."""
-        size = np.linalg.norm(self.sums, axis=1, keepdims=True)
-        return self.sums / np.where(size > 0, size, 1.0)
+        return self.facing.unit
 
     # ---------------------------------------------------------------- averages
     @cached_property

@@ -86,7 +86,7 @@ class MortarSlopes:
             by_gap = by_motion @ beside[:, :, None]
             by_normal = by_normal + by_gap * self.at.distances[:, None]
             by_distance = by_distance + by_gap * self.at.normals[:, None]
-        entries += [*(part.times(by_normal) for part in self._normals),
+        entries += [*(part.times(by_normal) for part in self.at.facing.slopes),
                     *self.by_distances(by_distance),
                     averaged(earlier.averages, by_motion)]  # fmt: skip
         nc, m = by_normal.shape[:2]
@@ -128,45 +128,6 @@ class MortarSlopes:
         """ds/dx, (nc d, nodes d)."""
         nothing = np.zeros(self._eyes.shape)
         return self.combined(nothing, nothing, self._eyes, earlier)
-
-    @cached_property
-    def _normals(self) -> list[SlotSlopes]:
-        """Of n, a part per facet, and one per pair of facets where some of it is met."""
-        (skin, _), n, x = self.at.pair.around, self.at.normals, self.at.x
-        (f, a), (nc, d) = skin.nodes.shape, n.shape
-        length = np.linalg.norm(self.at.sums, axis=1)
-        length = np.where(length > 0, length, 1.0)
-        project = (np.eye(d) - n[:, :, None] * n[:, None, :]) / length[:, None, None]
-        project = -project * self.at.pair.free[:, None, :]
-        own = np.full(len(x), -1)
-        own[self.at.slaves] = np.arange(nc)
-        heeded = self.at.heeded
-        row = np.where(heeded > 0, own[skin.nodes], -1)
-        share = (heeded / skin.corners[:, None])[:, :, None, None]
-        values = np.where((row >= 0)[:, :, None, None], project[row] * share, 0.0)
-        slopes = skin.area_slopes(x).reshape(f, 1, d, a * d)
-        out = [SlotSlopes(values @ slopes, row, dofs_of(skin.nodes, d))]
-        partly = np.asarray((heeded > 0) & (heeded < 1))
-        cut = np.asarray(partly.any(axis=1))
-        some = np.flatnonzero(cut)
-        if not len(some) or self.at.covered is None:
-            return out
-        # parts that are met change with the master: c a = C a / |a|, C the area that is met
-        facing = skin.areas(x)[some]
-        facing /= np.linalg.norm(facing, axis=1)[:, None]
-        along = np.einsum("fd,fdw->fw", facing, slopes[some, 0])
-        across = (values[some] @ facing[:, None, :, None]) * partly[some][..., None, None]
-        out[0].values[some] -= across * along[:, None, None, :]
-        of = self.at.faced[self.at.shared.of]
-        pairs = np.flatnonzero(cut[of])
-        of = of[pairs]
-        by_area, _, dofs = self.integrals
-        number = np.full(f, -1)
-        number[some] = np.arange(len(some))
-        by_area = by_area[pairs][:, :, :a].sum(axis=(1, 2))
-        across /= self.at.covered[some, None, None, None]
-        moved = across[number[of]] * by_area[:, None, None, :]
-        return [*out, SlotSlopes(moved, np.where(partly[of], row[of], -1), dofs[pairs])]
 
     @cached_property
     def integrals(self) -> tuple[Array, Array, Index]:
