@@ -37,10 +37,11 @@ Facets of second order have multipliers at their corners, psi dual to the functi
 order there; integrals are those over the facets through the corners ([PW]).  Bulges at the
 other nodes m, from the mean of corners c with parts w_mc, enter B as
 
-    B_pm = int psi_p N_m / D_p,    B_pc -> B_pc - w_mc B_pm,    of the master with -N_m.    (4)
+    B_pm = int chi_p N_m / D_p,    B_pc -> B_pc - w_mc B_pm,    of the master with -N_m,    (4)
 
-The force lambda_p then acts at p and at these; what a body needs of it at the corner is
-sum_j C_pj (f_int - f)_j, C_pp = 1 and C_pm = w_mp, as moving p without a bulge takes m along.
+chi = psi where all of a facet faces the master, see `shared`.  The force lambda_p then acts at
+p and at these; what a body needs of it at the corner is sum_j C_pj (f_int - f)_j, C_pp = 1 and
+C_pm = w_mp, as moving p without a bulge takes m along.
 
 One surface against itself falls into two sides, see `folds`; nodes that are of no slave facet
 alone are open like those that do not meet.
@@ -215,16 +216,17 @@ class MortarMeeting:
             return sparse.csr_array(shape)
         scale = np.where(row >= 0, self.by_weight[row], 0.0)[:, :, None]
         left = scale * (parts.psi @ parts.mass) * ~parts.kept[:, None, :]
-        onto = (scale * parts.psi)[parts.of] @ parts.cross
         a, b = left.shape[1], master.nodes.shape[1]
+        onto = (scale * parts.psi)[parts.of] @ parts.cross[..., :b]
         own = np.ones((nc, 1, 1)), np.arange(nc)[:, None], pair.slaves[:, None]
         beside = left, row, slave.nodes[parts.facets]
-        across = -onto[..., :b], row[parts.of], master.nodes[parts.master]
+        across = -onto, row[parts.of], master.nodes[parts.master]
         out = sum_of_blocks([own, beside, across], shape)
         if not self.has_bulges:
             return out
-        raised = scale * (parts.psi @ parts.own[:, :, a:]), row, slave.middles[parts.facets]
-        facing = -onto[..., b:], row[parts.of], master.middles[parts.master]
+        raised = scale * (parts.chi @ parts.own[:, :, a:]), row, slave.middles[parts.facets]
+        bent = (scale * parts.chi)[parts.of] @ parts.cross[..., b:]
+        facing = -bent, row[parts.of], master.middles[parts.master]
         bent = sum_of_blocks([raised, facing], shape)
         return sum_of_products([(None, out), (bent, self.bulges)], shape)
 
