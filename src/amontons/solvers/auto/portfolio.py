@@ -114,7 +114,7 @@ def _deep_sweeps(state: State) -> float:
 
 
 def _alternations(state: State) -> float:
-    return STEPS_AND_SWEEPS * (state.step_cost + SWEEPS * state.sweep_cost)
+    return STEPS_AND_SWEEPS * (state.alternation_cost + SWEEPS * state.sweep_cost)
 
 
 def _at_joints(state: State) -> float:

@@ -176,15 +176,18 @@ def smoothing_newton(state: State) -> Chunks:
 
 
 def alternating(state: State) -> Chunks:
-    """Newton's steps and sweeps in turn, again when others have a far better reaction."""
-    turn = yield Chunk(state.start, 0, 0.0)
+    """Newton's steps and sweeps in turn from the best reaction, again from a far better one.
+
+    From any better one where steps lead nowhere.
+    """
+    _ = yield Chunk(state.start, 0, 0.0)
     while True:
         way = Alternation(state.problem, state.r, state.error)
         own = state.error
         while not state.error < (0.99 if way.stalled else NEARER) * own:
             count = way.advance(state.goal)
-            cost = way.steps * state.step_cost + count * state.sweep_cost
-            turn = yield Chunk(way.r, max(way.steps, 1), cost, error=way.error)
+            cost = way.steps * state.alternation_cost + count * state.sweep_cost
+            _ = yield Chunk(way.r, max(way.steps, 1), cost, error=way.error)
             own = min(own, way.error)
 
 
@@ -241,6 +244,6 @@ def staged(stages: Staged, state: State) -> Chunks:
 
 
 __all__ = [
-    "alternating", "anderson", "inexact_newton", "interior_point", "momentum", "polish", "relaxed",
-    "semismooth_newton", "smoothing_newton", "staged",
+    "alternating", "anderson", "inexact_newton", "interior_point", "momentum", "polish",
+    "relaxed", "semismooth_newton", "smoothing_newton", "staged",
 ]  # fmt: skip

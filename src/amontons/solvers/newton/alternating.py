@@ -10,8 +10,8 @@ others open or stick again.  These are what a few sweeps put right.  So a step
 is judged by its error after some sweeps, in parts of its length until that is smaller.  The
 shift, in r's unit, is a proximal term that holds reactions where they are more than balances:
 smaller after whole steps, larger after short ones.  Where no part of a step with a larger and
-larger shift helps, as in a place that is no solution but near to be one, sweeps go on from there
-without asking for a smaller error.
+larger shift helps, as in a place that is no solution but near to be one, sweeps go on from
+there without asking for a smaller error.
 
 The idea is that of nonlinear preconditioning: X.-C. Cai, D. Keyes, SIAM J. Sci. Comput. 24
 (2002); the proximal term that of R. T. Rockafellar, SIAM J. Control Optim. 14 (1976).
@@ -70,23 +70,32 @@ class Alternation:
         self.steps = 0 if self.stalled else 1
         if self.stalled:
             return self._wander(goal)
-        step, done, self.since = self._step(), 0, self.since + 1
-        for part in PARTS if step is not None else ():
+        self.since += 1
+        step = self._step()
+        done, helped = (0, False) if step is None else self._along(step, goal)
+        if not helped:
+            self.shift = min(MUCH_STIFFER * self.shift, MOST_SHIFT)
+            self.failures += 1
+        return done
+
+    def _along(self, step: Array, goal: float) -> tuple[int, bool]:
+        """Sweeps made from parts of a step, and whether one of them helps, which is taken."""
+        done = 0
+        for part in PARTS:
             trial = self.r + part * step
             done += sweeps(self.data, trial, SWEEPS, watch_for(goal))
             error = self._judge(trial)
-            if error < self.error:
-                self.r, self.error, self.failures = trial, error, 0
-                if error < LESS * self.mark:
-                    self.mark, self.since = error, 0
-                if part == 1.0:
-                    self.shift = max(SOFTER * self.shift, LEAST_SHIFT)
-                elif part < PARTS[1]:
-                    self.shift = min(STIFFER * self.shift, MOST_SHIFT)
-                return done
-        self.shift = min(MUCH_STIFFER * self.shift, MOST_SHIFT)
-        self.failures += 1
-        return done
+            if not error < self.error:
+                continue
+            self.r, self.error, self.failures = trial, error, 0
+            if error < LESS * self.mark:
+                self.mark, self.since = error, 0
+            if part == 1.0:
+                self.shift = max(SOFTER * self.shift, LEAST_SHIFT)
+            elif part < PARTS[1]:
+                self.shift = min(STIFFER * self.shift, MOST_SHIFT)
+            return done, True
+        return done, False
 
     def _wander(self, goal: float) -> int:
         """Sweeps without asking for a smaller error."""
