@@ -35,6 +35,7 @@ HISTORY_CONTACT, DEEP_CONTACT = 35.0, 105.0
 MOMENTUM_CONTACT = 4.0
 PRODUCT = 5.4
 NEWTON_CONTACT = 500.0
+LINEARISED = 3e5  # of a step whose function and derivatives are not compiled, besides
 DENSE_STEP = 0.05  # per cube of the unknowns
 LIGHT = 1e6  # nanoseconds of a step up to which its cost is told without looking for faces
 DENSE = 0.5  # share of blocks of W above which it comes from a mesh
@@ -165,6 +166,11 @@ class State:
             return self.step_cost
         less = self.work.symbolic.products - self.work.sharing.products
         return self.step_cost - PRODUCT * less
+
+    @property
+    def alternation_cost(self) -> float:
+        """Nanoseconds of a Newton step in turn with sweeps, the calls about it included."""
+        return self.step_cost + LINEARISED
 
     @property
     def dense_step_cost(self) -> float:
