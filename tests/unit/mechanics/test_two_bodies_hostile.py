@@ -170,7 +170,7 @@ def ending(what):
     lower, upper = bodies()
     if what == "pressed flat":
         down = am.Fix("upper.top", (0, lambda x, t: -2.2 * t))
-        return model([lower, upper], down), "cell .* of body '.*' is pressed to det F"
+        return model([lower, upper], down), "cell .* of body 'upper' is pressed to det F"
     if what == "not a number":
         torn = am.Body(upper.mesh, brittle(), name="upper")
         held = [am.Fix("upper.left", (0, -0.02)),

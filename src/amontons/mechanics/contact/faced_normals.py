@@ -34,7 +34,6 @@ if TYPE_CHECKING:
 Array = NDArray[np.float64]
 Index = NDArray[np.int64]
 Mask = NDArray[np.bool_]
-ROUNDING = 1e-12  # of a facet: what does not face the master where all of it does
 
 
 @dataclass(frozen=True, eq=False)
@@ -46,9 +45,12 @@ class FacedNormals:
     @cached_property
     def of(self) -> Index:
         """Which of the facets around, (k,)."""
-        at = self.at
-        numbers = at.shared.facets[at.shared.of]
-        return numbers if at.pair.fold is None else at.pair.fold.halves[0][numbers]
+        return self._around(self.at.shared.facets[self.at.shared.of])
+
+    def _around(self, numbers: Index) -> Index:
+        """Facets of the slave as they are counted around its nodes."""
+        fold = self.at.pair.fold
+        return numbers if fold is None else fold.halves[0][numbers]
 
     @cached_property
     def _areas(self) -> Array:
@@ -69,12 +71,12 @@ class FacedNormals:
     @cached_property
     def covered(self) -> Array:
         """c, (f,)."""
-        whole = np.linalg.norm(self._own, axis=1)
+        facets = len(self._own)
         if self.at.pair.areas is None:
-            return np.ones(len(whole))
-        met = np.bincount(self.of, self._areas, minlength=len(whole))
-        out = met / np.where(whole > 0, whole, 1.0)
-        return np.where(np.abs(out - 1) < ROUNDING, 1.0, out)
+            return np.ones(facets)
+        out = np.zeros(facets)
+        out[self._around(self.at.shared.facets)] = self.at.shared.covered
+        return out
 
     @cached_property
     def _partly(self) -> Mask:

@@ -312,12 +312,7 @@ def _to_global(R, own):
 @njit(cache=True, error_model="numpy")
 def _to_own(R, vectors):
     """R^T vectors, (n, 3)."""
-    out = np.zeros_like(vectors)
-    for b in range(len(vectors)):
-        for i in range(3):
-            for k in range(3):
-                out[b, i] += R[b, k, i] * vectors[b, k]
-    return out
+    return _to_global(R.transpose(0, 2, 1), vectors)
 
 
 @njit(cache=True, error_model="numpy")
