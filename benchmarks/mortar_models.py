@@ -16,6 +16,7 @@ import amontons as am
 
 Array = NDArray[np.float64]
 YOUNG, POISSON = 1000.0, 0.3
+SYMMETRY = 1e-9  # coordinates of planes of symmetry that are rounded
 
 
 def mapped(mesh: am.Mesh, position: Callable[[Array], Array]) -> am.Mesh:
@@ -262,3 +263,19 @@ class Rings:
         outer = (c**2 + b**2) / (c**2 - b**2) + poisson
         inner = (b**2 + a**2) / (b**2 - a**2) - poisson
         return self.overlap * young / (b * (outer + inner))
+
+    def missed(self, problem: am.FrictionProblem, model: am.Model) -> Array:
+        """Overlap that contacts of its problem see in Lamé's own displacements of b, (nc,)."""
+        a, b, c = self.radii
+        young, poisson = YOUNG / (1 - POISSON**2), POISSON / (1 - POISSON)
+        grown = self.lame * b / young
+        by = (-grown * ((b**2 + a**2) / (b**2 - a**2) - poisson),
+              grown * ((c**2 + b**2) / (c**2 - b**2) + poisson))  # fmt: skip
+        points = [body.mesh.points for body in model.bodies]
+        moved = np.concatenate([
+            u * x / np.linalg.norm(x, axis=1, keepdims=True)
+            for u, x in zip(by, points, strict=True)
+        ])  # fmt: skip
+        free = np.abs(np.concatenate(points)) > SYMMETRY
+        v = moved[free]
+        return (problem.H.T @ v).reshape(problem.w.shape)[:, 0] + problem.w[:, 0]
