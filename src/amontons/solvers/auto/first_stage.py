@@ -96,6 +96,77 @@ def _until_settled(s, x, after, history, gram, count, sweeps, floor, u, weak, we
 
 
 @njit(cache=True, error_model="numpy", nogil=True)
+def _begin(s, row, x, after, gram, watch, stored):
+    """Begin anew with a problem: nothing is stored, the error of its start is told."""
+    gram[:, :] = stored[:] = 0.0
+    copy_rows_inplace(x, after)
+    watch[0], watch[1], watch[2] = row[GOAL], FIRST_JUDGED * row[GOAL], math.inf
+    row[SWEEPS], row[CHANGED] = 0.0, 0.0
+    row[START] = row[ERROR] = natural_error(
+        s.indptr, s.indices, s.rows, s.q, s.kind, s.parameters, s.rho, x
+    )
+
+
+@njit(cache=True, error_model="numpy", nogil=True)
+def _assess(s, row, floor, x, after, u, status, sliding):
+    """All that is asked of x, (nc, 3), made to keep to its statuses; True where all will do."""
+    kept = np.empty_like(x)
+    while True:
+        found, worst, contact, hidden, changed = assess(
+            s.indptr, s.indices, s.rows, s.q, s.kind, s.parameters, s.rho, x, floor, u, kept,
+            status, sliding,
+        )  # fmt: skip
+        row[WORST], row[CONTACT], row[HIDDEN] = worst, contact, hidden
+        if row[CHANGED] > 0.0:
+            row[ERROR] = found
+        if not changed or not row[ERROR] <= row[GOAL]:
+            return row[ERROR] <= row[GOAL] and not worst > row[WEAKEST]
+        row[CHANGED] = 1.0
+        copy_rows_inplace(kept, x)
+        copy_rows_inplace(x, after)
+
+
+@njit(cache=True, error_model="numpy", nogil=True)
+def _solve(s, row, floor, x, u, status, sliding, after, history, gram, watch, stored):  # noqa: PLR0913
+    """Go on with one problem until it is solved or its limit; arguments as of `solve_range`."""
+    weak, goal, left = stored[2] > 0.0, row[GOAL], int(row[LIMIT] - row[SWEEPS])
+    count = np.array([int(stored[0]), int(stored[1])])
+    while True:
+        if weak or not row[ERROR] <= goal:
+            if weak:
+                done, contact = _until_settled(
+                    s, x, after, history, gram, count, left, floor, u, int(row[CONTACT]),
+                    row[WEAKEST],
+                )  # fmt: skip
+                content, row[CONTACT] = contact < 0, contact
+            else:
+                done = anderson_inplace(s, x, after, history, gram, count, left, watch)
+                content = watch[2] < math.inf
+            left -= done
+            row[SWEEPS] += done
+            row[ERROR] = watch[2]
+            if weak or not content:
+                row[ERROR] = natural_error(
+                    s.indptr, s.indices, s.rows, s.q, s.kind, s.parameters, s.rho, x
+                )
+            if not content:
+                row[WORST] = math.inf
+                break
+            watch[0], watch[1], watch[2] = goal, FIRST_JUDGED * goal, math.inf
+            if not row[ERROR] <= goal:
+                weak = False
+                continue
+        good = _assess(s, row, floor, x, after, u, status, sliding)
+        if good or row[CONTACT] < 0 or row[ERROR] == 0.0:
+            weak = False
+            break
+        weak = row[ERROR] <= goal
+        row[CHANGED] = 0.0
+    row[WORK] = s.work[0]
+    stored[0], stored[1], stored[2] = count[0], count[1], 1.0 if weak else 0.0
+
+
+@njit(cache=True, error_model="numpy", nogil=True)
 def solve_range(first, last, sizes, table, data, floor, r, u, states, memory):  # noqa: PLR0913
     """Go on with problems first to last - 1 from r, until they are solved or their limits.
 
@@ -109,80 +180,28 @@ def solve_range(first, last, sizes, table, data, floor, r, u, states, memory):  
     indptr, indices, blocks, full, q, kind, parameters, rho, diagonal, eliminated, order = data
     gram = memory[:GRAM].reshape(DEPTH + 1, DEPTH)
     watch, stored = memory[GRAM : GRAM + 3], memory[GRAM + 3 : OWN]
-    count = np.zeros(2, dtype=np.int64)
     for p in range(first, last):
         a, b, c, d = sizes[p, 0], sizes[p + 1, 0], sizes[p, 1], sizes[p + 1, 1]
-        row, nc, goal = table[p], b - a, table[p, GOAL]
+        row, size = table[p], 3 * (b - a)
         by_rows = full[sizes[p, 2] : sizes[p + 1, 2]]
-        rows = by_rows.reshape(nc, 3, 3 * nc) if len(by_rows) else blocks[c:d]
+        rows = by_rows.reshape(b - a, 3, size) if len(by_rows) else blocks[c:d]
         s = Sweep(
             indptr[a + p : b + p + 1], indices[c:d], blocks[c:d], rows, q[a:b], kind[a:b],
             parameters[a:b], rho[a:b], diagonal[a:b], eliminated[a:b], order[a:b], EXACT, 1.0,
             CLOSE, STEPS, np.zeros(1),
         )  # fmt: skip
-        x, size, kept = r[a:b], 3 * nc, np.empty((nc, 3))
-        after = memory[OWN : OWN + size].reshape(nc, 3)
+        after = memory[OWN : OWN + size].reshape(b - a, 3)
         history = memory[OWN + size : OWN + VECTORS * size].reshape(2, DEPTH + 1, size)
-        if row[SWEEPS] < math.inf:
-            count[0], count[1], weak = int(stored[0]), int(stored[1]), stored[2] > 0.0
-            s.work[0] = row[WORK]
-            if not weak:
-                row[ERROR] = math.inf  # the sweeps ask for it, as they would have
+        if not row[SWEEPS] < math.inf:
+            _begin(s, row, r[a:b], after, gram, watch, stored)
         else:
-            gram[:, :] = 0.0
-            count[0], count[1], weak = 0, 0, False
-            copy_rows_inplace(x, after)
-            watch[0], watch[1], watch[2] = goal, FIRST_JUDGED * goal, math.inf
-            row[SWEEPS], row[CHANGED] = 0.0, 0.0
-            row[START] = row[ERROR] = natural_error(
-                s.indptr, s.indices, rows, s.q, s.kind, s.parameters, s.rho, x
-            )
-        left = int(row[LIMIT] - row[SWEEPS])
-        while True:
-            if weak or not row[ERROR] <= goal:
-                if weak:
-                    done, contact = _until_settled(
-                        s, x, after, history, gram, count, left, floor[a:b], u[a:b],
-                        int(row[CONTACT]), row[WEAKEST],
-                    )  # fmt: skip
-                    content, row[CONTACT] = contact < 0, contact
-                else:
-                    done = anderson_inplace(s, x, after, history, gram, count, left, watch)
-                    content = watch[2] < math.inf
-                left -= done
-                row[SWEEPS] += done
-                row[ERROR] = watch[2]
-                if weak or not content:
-                    row[ERROR] = natural_error(
-                        s.indptr, s.indices, rows, s.q, s.kind, s.parameters, s.rho, x
-                    )
-                if not content:
-                    row[WORST] = math.inf
-                    break
-                watch[0], watch[1], watch[2] = goal, FIRST_JUDGED * goal, math.inf
-                if not row[ERROR] <= goal:
-                    weak = False
-                    continue
-            while True:
-                found, worst, contact, hidden, changed = assess(
-                    s.indptr, s.indices, rows, s.q, s.kind, s.parameters, s.rho, x,
-                    floor[a:b], u[a:b], kept, states[0, a:b], states[1, a:b],
-                )  # fmt: skip
-                row[WORST], row[CONTACT], row[HIDDEN] = worst, contact, hidden
-                if row[CHANGED] > 0.0:
-                    row[ERROR] = found
-                if not changed or not row[ERROR] <= goal:
-                    break
-                row[CHANGED] = 1.0
-                copy_rows_inplace(kept, x)
-                copy_rows_inplace(x, after)
-            weak = worst > row[WEAKEST]
-            if contact < 0 or row[ERROR] == 0.0 or (row[ERROR] <= goal and not weak):
-                break
-            weak = weak and row[ERROR] <= goal
-            row[CHANGED] = 0.0
-        row[WORK] = s.work[0]
-        stored[0], stored[1], stored[2] = count[0], count[1], 1.0 if weak else 0.0
+            s.work[0] = row[WORK]
+            if not stored[2] > 0.0:
+                row[ERROR] = math.inf  # the sweeps ask for it, as they would have
+        _solve(
+            s, row, floor[a:b], r[a:b], u[a:b], states[0, a:b], states[1, a:b], after, history,
+            gram, watch, stored,
+        )  # fmt: skip
 
 
 class Read(NamedTuple):
