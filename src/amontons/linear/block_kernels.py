@@ -11,6 +11,7 @@ from ..core.compiled import njit
 
 WELL_CONDITIONED = 1e-6  # |det A| / max|A|^3 from which A^-1 loses no digits that matter
 TURNS = 12  # of Jacobi's method at most; three or four do
+TWICE = -0.99  # cosine of three times the angle, -1 where the two largest are one
 ALIKE = 1e-17  # entry beside the diagonal, relative to it, that is none
 WHOLE = 0  # rows of a contact that are whole blocks in ascending order
 NEXT, AFTER = (1, 2, 0), (2, 0, 1)  # of the three axes
@@ -244,7 +245,28 @@ def _turn(x, y, z):
 
 @njit(cache=True, error_model="numpy")
 def _largest_eigenvalue(x, y, z, xy, xz, yz):
-    """Of the symmetric [[x, xy, xz], [xy, y, yz], [xz, yz, z]], by Jacobi's rotations."""
+    """Of the symmetric [[x, xy, xz], [xy, y, yz], [xz, yz, z]], all its digits.
+
+    In closed form [Smith, Comm. ACM 4 (1961) 168], in a fifth of the time of rotations; these
+    where the two largest are so near one another that the angle loses digits.
+    """
+    beside = xy * xy + xz * xz + yz * yz
+    if beside <= (ALIKE * max(x, y, z)) ** 2:
+        return max(x, y, z)
+    mean = (x + y + z) / 3.0
+    a, b, c = x - mean, y - mean, z - mean
+    square = (a * a + b * b + c * c + 2.0 * beside) / 6.0
+    size = math.sqrt(square)
+    det = a * (b * c - yz * yz) - xy * (xy * c - yz * xz) + xz * (xy * yz - b * xz)
+    cosine = det / (2.0 * square * size)
+    if not cosine > TWICE:
+        return _by_rotations(x, y, z, xy, xz, yz)
+    return mean + 2.0 * size * math.cos(math.acos(min(cosine, 1.0)) / 3.0)
+
+
+@njit(cache=True, error_model="numpy")
+def _by_rotations(x, y, z, xy, xz, yz):
+    """The same by Jacobi's method."""
     for _ in range(TURNS):
         rest = max(abs(xy), abs(xz), abs(yz))
         if abs(xy) > ALIKE * max(x, y):

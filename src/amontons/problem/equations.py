@@ -267,6 +267,15 @@ class Equations(Matrices):
         sources = (self.blocks.indptr, self.blocks.indices)
         return self._shared.once(make, sources, self)
 
+    def kept_alone(self, make: Callable[[Self], T]) -> T:
+        """make(problem), made once for this problem with its load and law, see `kept`."""
+        found = self._made.get(make)
+        return self._made.setdefault(make, make(self)) if found is None else found
+
+    @cached_property
+    def _made(self) -> dict[Callable[..., Any], Any]:
+        return {}
+
     def accepted(
         self, r: Array, v: Array | None, error: float, tolerance: float
     ) -> Accepted:

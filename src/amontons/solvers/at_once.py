@@ -13,9 +13,10 @@ from numpy.typing import NDArray
 
 from ..core.clock import compiling, now
 from ..core.errors import InvalidInput, shown
+from ..core.quick import made
 from ..linear.blocks import spatial
 from ..problem.friction import Form, FrictionProblem
-from ..problem.judge.measures import Criterion, Measure, ratio
+from ..problem.judge.measures import Criterion, Measure
 from ..problem.settling import Settled
 from ..problem.solution import Convergence, FrictionSolution, Outcome, Step
 from .asked import Asked
@@ -29,7 +30,7 @@ from .auto.first_stage import (
     WORST,
     Together,
 )
-from .auto.state import is_brief
+from .auto.state import Begun, Swept, is_light
 from .first_iterate import first_iterate
 from .judging import BLUR
 
@@ -57,23 +58,31 @@ def local_form(problem: FrictionProblem) -> FrictionProblem | None:
     return problem if problem.q_norm > 0 else None
 
 
-def at_once(problem: Any, asked: Asked, start: Any) -> FrictionSolution | None:
-    """The solution of a small problem in Delassus form; None where the driver has to go on.
+def at_once(problem: Any, asked: Asked, start: Any) -> FrictionSolution | Begun | None:
+    """The solution of a problem in Delassus form that the first stage solves.
 
-    The driver's own way costs more than the sweeps of such a problem, even these twice.
+    Where it does not, what it has begun, for the race to go on from; None where it is not made:
+    of what is no such problem or dear, or where every iterate is to be seen.
     """
     if not isinstance(problem, FrictionProblem) or problem.form is Form.GLOBAL:
         return None
     plain = asked.callback is None and asked.criterion is Criterion.JUDGE
-    if not plain or asked.max_iterations is not None or not is_brief(problem, asked.tolerance):
+    if not plain or asked.max_iterations is not None or not is_light(problem):
         return None
     began, compiled = now(), compiling()
     mine = local_form(problem)
     if mine is None or asked.deadline.work is not None or asked.deadline.passed:
         return None
     together = Together([mine], asked.tolerance, begin_of(mine, start), asked.of_contacts)
-    together.solve(0, 1)
-    return told(together, 0, problem, asked, now() - began, compiling() - compiled)
+    chunks: list[Swept] = []
+    for _ in together.chunks():
+        found = told(together, 0, problem, asked, now() - began, compiling() - compiled)
+        if found is not None:
+            return found
+        chunks.append(together.swept(chunks))
+        if asked.deadline.passed:
+            break
+    return together.begun(begin_of(mine, start), chunks)
 
 
 def begin_of(problem: FrictionProblem, start: Any) -> Array:
@@ -88,31 +97,37 @@ def told(
     compiled: float = 0.0,
 ) -> FrictionSolution | None:  # fmt: skip
     """The solution of problem p, given in the form `problem`; None where it has none."""
-    row, mine = together.told[p].tolist(), together.problems[p]
-    size, d = float(together.norms[p]), mine.dimension
-    error, worst = ratio(row[ERROR], size), row[WORST]
-    hidden = ratio(row[HIDDEN], size)
+    row, mine = together.table[p].tolist(), together.problems[p]
+    size, d, worst = mine.q_norm, mine.dimension, row[WORST]
+    error, hidden = row[ERROR] / size, row[HIDDEN] / size
     if not (error <= asked.tolerance and worst <= asked.of_contacts):
         return None
     if not hidden <= BLUR * asked.tolerance:
         return None
-    a, b = together.sizes[p, 0], together.sizes[p + 1, 0]
-    r, u = np.array(together.r[a:b, :d]), np.array(together.u[a:b, :d])
-    settled = Settled(
-        r, np.array(together.status[a:b]), together.sliding[a:b].astype(bool), row[CHANGED] > 0
-    )
-    count, flops = int(row[SWEEPS]), mine.judge_flops
-    history = [Step(0, ratio(row[START], size), 0, 0.0, flops=flops)]
+    r, u, (status, sliding) = together.r, together.u, together.states
+    if len(together.problems) > 1 or d == 2:
+        a, b = together.sizes[p, 0], together.sizes[p + 1, 0]
+        r, u = np.array(r[a:b, :d]), np.array(u[a:b, :d])
+        status, sliding = np.array(status[a:b]), np.array(sliding[a:b])
+    count = int(row[SWEEPS])
+    settled = Settled(r, status, sliding.view(np.bool_), row[CHANGED] > 0)
+    flops = mine.judge_flops
+    history = (Step(0, row[START] / size, 0, 0.0, None, flops),)
     if count:
         flops += together.flops(p) + mine.judge_flops
-        history.append(Step(count, error, 0, seconds, flops=flops, stage=STAGE))
-    record = Convergence(
-        Outcome.CONVERGED, count, error, asked.tolerance, tuple(history), 0, seconds, "Auto",
-        Measure.EXACT, STAGE if count else "", worst, asked.of_contacts,
-        int(row[CONTACT]) if row[CONTACT] >= 0 else None, compiling=compiled,
+        history = (*history, Step(count, error, 0, seconds, None, flops, STAGE))
+    record = made(
+        Convergence, outcome=Outcome.CONVERGED, iterations=count, error=error,
+        tolerance=asked.tolerance, history=history, linear_iterations=0, seconds=seconds,
+        solver="Auto", measure=Measure.EXACT, detail=STAGE if count else "",
+        contact_error=worst, contact_tolerance=asked.of_contacts,
+        weakest=int(row[CONTACT]) if row[CONTACT] >= 0 else None, compiling=compiled,
         flops=flops,
     )  # fmt: skip
-    if problem is mine:
-        return FrictionSolution(mine, r, u, None, record, settled=settled)
-    of, u, v = problem.recover(r)
-    return FrictionSolution(of, r, u, v, record, settled=settled)
+    if problem is not mine:
+        of, u, v = problem.recover(r)
+        return FrictionSolution(of, r, u, v, record, settled=settled)
+    r.flags.writeable = u.flags.writeable = False
+    return made(
+        FrictionSolution, problem=mine, r=r, u=u, v=None, convergence=record, settled=settled
+    )

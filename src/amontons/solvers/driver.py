@@ -16,6 +16,7 @@ from ..problem.solution import FrictionSolution, Outcome
 from . import Auto
 from .asked import PATIENCE, Asked, Callback
 from .at_once import at_once
+from .auto.hybrid import Continued
 from .changed_law import changed_law
 from .contract import Iterate, Solver, check_solver, fitted
 from .first_iterate import as_it_is, first_iterate, own_motion
@@ -91,11 +92,12 @@ def drive_as_asked(
 ) -> FrictionSolution:
     """The solve that `drive` makes; `taken` makes of an iterate what is judged of it."""
     solver = solver if solver is not None else Auto()
+    begun = None
     if isinstance(solver, Auto):
         found = at_once(problem, asked, start) if taken is own_motion else None
-        if found is not None:
+        if isinstance(found, FrictionSolution):
             return found
-        solver = solver.choice(problem)
+        solver, begun = solver.choice(problem), found
     check_solver(solver)
     if problem.law.varies or problem.plain is not problem:
         solved = varying_law if problem.law.varies else changed_law
@@ -103,6 +105,7 @@ def drive_as_asked(
         return solved(problem, asked, start, again)
     asked.check_fits(problem)
     watch = Watch(problem, asked, type(solver).__name__, taken)
+    solver = solver if begun is None else Continued(begun)
     condensed_by = asked.deadline if asked.condense else None
     try:
         fit = watch.problem = fitted(problem, solver, condensed_by)

@@ -100,7 +100,7 @@ def _in_ranges(pool: ThreadPoolExecutor, together: Together, end: float) -> Arra
         return time.perf_counter() - began
 
     took = sum(pool.map(solve, cuts[:-1].tolist(), cuts[1:].tolist()))
-    work = together.told[:, SWEEPS] * np.diff(together.sizes[:, 1])
+    work = together.table[:, SWEEPS] * np.diff(together.sizes[:, 1])
     work = np.where(np.isfinite(work), work, 0.0)
     return took * work / max(work.sum(), 1.0)
 

@@ -87,6 +87,14 @@ def contacts(A):
     return block_rows(sparse.csr_array(sparse.block_diag(list(A))), 3)
 
 
+@pytest.mark.parametrize("apart", [0.0, 1e-12, 1e-9, 1e-6, 1e-3])
+@pytest.mark.parametrize("third", [1.0, 0.3, 1e-9, 2.0])
+def test_inverse_norms_where_values_are_near_one_another(apart, third):
+    Q = np.linalg.qr(np.random.default_rng(1).standard_normal((20, 3, 3)))[0]
+    A = Q @ (np.array([1.0, 1.0 - apart, third])[:, None] * Q.swapaxes(1, 2))
+    np.testing.assert_allclose(contacts(A).inverse_norms, 1 / max(1.0, third), rtol=3e-15)
+
+
 @pytest.mark.parametrize("size", [1e-140, 1e-3, 1.0, 1e120])
 def test_inverse_norms_and_what_one_contact_needs(size):
     rng = np.random.default_rng(0)

@@ -74,6 +74,40 @@ def _pushes(indptr, indices, data, r, i):
     return total
 
 
+@njit(cache=True, error_model="numpy", inline="always")
+def _size(r0, r1, r2, u0, u1, u2, rho, kind, p):  # noqa: PLR0913
+    """How far a contact is from its law, unit of u: its natural map, half its penetration."""
+    if rho > 0.0:
+        e0, e1, e2 = contact_residual(r0, r1, r2, u0, u1, u2, rho, kind, p)
+        return max(math.sqrt(e0 * e0 + e1 * e1 + e2 * e2), -PENETRATION * u0)
+    if r0 != 0.0 or r1 != 0.0 or r2 != 0.0:
+        return math.inf
+    return math.sqrt(u0 * u0 + u1 * u1 + u2 * u2) if kind == TIED else max(-u0, 0.0)
+
+
+@njit(cache=True, error_model="numpy", fastmath={"contract"})
+def weak_contact(  # noqa: PLR0913
+    indptr, indices, data, q, kind, parameters, rho, r, floor, u, first, most
+):
+    """A contact whose error on its own scale is above `most`, -1 without; `first` comes first.
+
+    Arguments as of `assess`; u (nc, 3) is memory.
+    """
+    nc = len(kind)
+    for k in range(nc):
+        i = first + k if first + k < nc else first + k - nc
+        velocity_of_rows_inplace(i, i + 1, indptr, indices, data, q, r, u)
+        scale = floor[i] + math.sqrt(q[i, 0] ** 2 + q[i, 1] ** 2 + q[i, 2] ** 2)
+        size = _size(
+            r[i, 0], r[i, 1], r[i, 2], u[i, 0], u[i, 1], u[i, 2], rho[i], kind[i], parameters[i]
+        )
+        if not size <= most * scale:
+            scale += _pushes(indptr, indices, data, r, i)
+            if not size <= most * scale:
+                return i
+    return -1
+
+
 @njit(cache=True, error_model="numpy", fastmath={"contract"})
 def assess(  # noqa: PLR0913
     indptr, indices, data, q, kind, parameters, rho, r, floor, u, kept, status, sliding
@@ -91,17 +125,10 @@ def assess(  # noqa: PLR0913
         scale = floor[i] + math.sqrt(q[i, 0] ** 2 + q[i, 1] ** 2 + q[i, 2] ** 2)
         u0, u1, u2, p = u[i, 0], u[i, 1], u[i, 2], parameters[i]
         r0, r1, r2 = r[i, 0], r[i, 1], r[i, 2]
+        size = _size(r0, r1, r2, u0, u1, u2, rho[i], kind[i], p)
         if rho[i] > 0.0:
-            e0, e1, e2 = contact_residual(r0, r1, r2, u0, u1, u2, rho[i], kind[i], p)
-            size = max(math.sqrt(e0 * e0 + e1 * e1 + e2 * e2), -PENETRATION * u0)
             fixed = given(kind[i], p, r0)
             hidden += hidden_square(r0, r1, r2, rho[i], 0.0 if fixed else p[MU])
-        elif r0 != 0.0 or r1 != 0.0 or r2 != 0.0:
-            size = math.inf
-        elif kind[i] == TIED:
-            size = math.sqrt(u0 * u0 + u1 * u1 + u2 * u2)
-        else:
-            size = max(-u0, 0.0)
         total += size * size
         if not size <= worst * scale:  # also where it is not a number
             scale += _pushes(indptr, indices, data, r, i)
@@ -142,4 +169,4 @@ def assessed(data: tuple[Any, ...], r: Array, floor: Array, scale: float) -> Ass
     )
 
 
-__all__ = ["Assessed", "assess", "assessed", "settled_contact"]
+__all__ = ["Assessed", "assess", "assessed", "settled_contact", "weak_contact"]

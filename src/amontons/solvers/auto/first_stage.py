@@ -1,18 +1,22 @@
-"""The first stage of `Auto` on many small problems, compiled: sweeps and judge in one call.
+"""The first stage of `Auto` on small problems, compiled: sweeps and judge in one call.
 
 Most problems of a simulator end in the first chunks of the first track, accelerated sweeps
 (`portfolio`), whose arithmetic takes some microseconds and whose way through the driver fifty.
 Here all problems stand one behind the other in shared arrays, and one call without Python's
-lock goes through a range of them: the same sweeps, judge and reactions, bit by bit, as those of
-`drive` where that ends in these chunks; where it does not, it is asked.
+lock goes through a range of them: the same sweeps, judge and reactions, bit by bit, for one
+problem and for many.  What does not end here goes on in the race from where it is (`Begun`).
+
+Where the sum of all errors will do but not the weakest contact, contacts are looked at after
+every sweep, that one first, until one will not do, and all are judged again where all will.
 """
 
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
-from functools import lru_cache
+from functools import cached_property, lru_cache
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -21,9 +25,8 @@ from ...core.arrays import read_only
 from ...core.compiled import njit
 from ...core.copies import copy_rows_inplace
 from ...problem.friction import FrictionProblem
-from ...problem.judge.contacts import assess
+from ...problem.judge.contacts import assess, weak_contact
 from ...problem.judge.measures import natural_error
-from ..judging import TIGHTER
 from ..sweeps.kernels import (
     EXACT,
     FIRST_JUDGED,
@@ -38,8 +41,11 @@ from .state import (
     FIRST_CHUNKS,
     HISTORY_CONTACT,
     SIZES,
+    Begun,
+    Swept,
     chunks_alone,
     is_brief,
+    is_light,
     nanoseconds_of_sweep,
     visits,
 )
@@ -47,82 +53,173 @@ from .tracks import DEPTH, LEAST
 
 Array = NDArray[np.float64]
 Counts = NDArray[np.int64]
-# Columns of what is told of a problem.
-SWEEPS, START, ERROR, WORST, CONTACT, HIDDEN, CHANGED, WORK = range(8)
+# Columns of the table of problems.  Given: sweeps at most, errors that will do, of all and of
+# the weakest contact.  Told: sweeps, error at the start and now, error of the weakest contact,
+# which it is, what rounding hides, whether reactions were made to keep to their statuses,
+# operations on single contacts and of judgements.  Errors of all in the unit of u.
+LIMIT, GOAL, WEAKEST, SWEEPS, START, ERROR, WORST, CONTACT, HIDDEN, CHANGED, WORK = range(11)
+NOTHING = [math.inf] * (WORK - WEAKEST)  # is told yet
 NO_NUMBERS = read_only(np.empty(0))
+GRAM = (DEPTH + 1) * DEPTH
+# numbers of a memory beside its vectors: gram, watch (3,), count (2,), whether it is weak
+OWN = GRAM + 6
+VECTORS = 2 * (DEPTH + 1) + 1  # in it: the history and the next point
 
 
 @lru_cache(maxsize=SIZES)
-def sweeps_of_first_chunks(blocks: int, contacts: int, chunks: int = FIRST_CHUNKS) -> int:
-    """Sweeps of so many first chunks, those that the first track has before all others."""
-    cost, total, done = nanoseconds_of_sweep(blocks, contacts, HISTORY_CONTACT), 0.0, 0
-    for _ in range(chunks):
+def first_chunks(blocks: int, contacts: int) -> tuple[int, ...]:
+    """Sweeps of each of the chunks that the first track has before all others."""
+    cost, total, out = nanoseconds_of_sweep(blocks, contacts, HISTORY_CONTACT), 0.0, []
+    for _ in range(FIRST_CHUNKS):
         sweeps = max(LEAST, int(max(GROWTH * total, SHORTEST) / cost))
-        total, done = total + sweeps * cost + CALL, done + sweeps
-    return done
+        total += sweeps * cost + CALL
+        out.append(sweeps)
+    return tuple(out)
 
 
 @njit(cache=True, error_model="numpy", nogil=True)
-def solve_range(  # noqa: PLR0913
-    first, last, sizes, limits, goals, weakest, data, floor, r, u, kept, status, sliding, told
-):
-    """Solve problems first to last - 1, from r; those that are not solved have error inf.
+def _until_settled(s, x, after, history, gram, count, sweeps, floor, u, weak, weakest):  # noqa: PLR0913
+    """Sweeps until all contacts will do: (how many, one that will not or -1).
+
+    weak: one that will not do at first; u (nc, 3) is memory.
+    """
+    never = np.array([0.0, -1.0, math.inf])
+    for k in range(sweeps):
+        anderson_inplace(s, x, after, history, gram, count, 1, never)
+        weak = weak_contact(
+            s.indptr, s.indices, s.rows, s.q, s.kind, s.parameters, s.rho, x, floor, u, weak,
+            weakest,
+        )  # fmt: skip
+        if weak < 0:
+            return k + 1, weak
+    return sweeps, weak
+
+
+@njit(cache=True, error_model="numpy", nogil=True)
+def _begin(s, row, x, after, gram, watch, stored):
+    """Begin anew with a problem: nothing is stored, the error of its start is told."""
+    gram[:, :] = stored[:] = 0.0
+    copy_rows_inplace(x, after)
+    watch[0], watch[1], watch[2] = row[GOAL], FIRST_JUDGED * row[GOAL], math.inf
+    row[SWEEPS], row[CHANGED] = 0.0, 0.0
+    row[START] = row[ERROR] = natural_error(
+        s.indptr, s.indices, s.rows, s.q, s.kind, s.parameters, s.rho, x
+    )
+
+
+@njit(cache=True, error_model="numpy", nogil=True)
+def _assess(s, row, floor, x, after, u, status, sliding):
+    """All that is asked of x, (nc, 3), made to keep to its statuses; True where all will do."""
+    kept = np.empty_like(x)
+    while True:
+        found, worst, contact, hidden, changed = assess(
+            s.indptr, s.indices, s.rows, s.q, s.kind, s.parameters, s.rho, x, floor, u, kept,
+            status, sliding,
+        )  # fmt: skip
+        row[WORST], row[CONTACT], row[HIDDEN] = worst, contact, hidden
+        if row[CHANGED] > 0.0:
+            row[ERROR] = found
+        if not changed or not row[ERROR] <= row[GOAL]:
+            return row[ERROR] <= row[GOAL] and not worst > row[WEAKEST]
+        row[CHANGED] = 1.0
+        copy_rows_inplace(kept, x)
+        copy_rows_inplace(x, after)
+
+
+@njit(cache=True, error_model="numpy", nogil=True)
+def _solve(s, row, floor, x, u, status, sliding, after, history, gram, watch, stored):  # noqa: PLR0913
+    """Go on with one problem until it is solved or its limit; arguments as of `solve_range`."""
+    weak, goal, left = stored[2] > 0.0, row[GOAL], int(row[LIMIT] - row[SWEEPS])
+    count = np.array([int(stored[0]), int(stored[1])])
+    while True:
+        if weak or not row[ERROR] <= goal:
+            if weak:
+                done, contact = _until_settled(
+                    s, x, after, history, gram, count, left, floor, u, int(row[CONTACT]),
+                    row[WEAKEST],
+                )  # fmt: skip
+                content, row[CONTACT] = contact < 0, contact
+            else:
+                done = anderson_inplace(s, x, after, history, gram, count, left, watch)
+                content = watch[2] < math.inf
+            left -= done
+            row[SWEEPS] += done
+            row[ERROR] = watch[2]
+            if weak or not content:
+                row[ERROR] = natural_error(
+                    s.indptr, s.indices, s.rows, s.q, s.kind, s.parameters, s.rho, x
+                )
+            if not content:
+                row[WORST] = math.inf
+                break
+            watch[0], watch[1], watch[2] = goal, FIRST_JUDGED * goal, math.inf
+            if not row[ERROR] <= goal:
+                weak = False
+                continue
+        good = _assess(s, row, floor, x, after, u, status, sliding)
+        if good or row[CONTACT] < 0 or row[ERROR] == 0.0:
+            weak = False
+            break
+        weak = row[ERROR] <= goal
+        row[CHANGED] = 0.0
+    row[WORK] = s.work[0]
+    stored[0], stored[1], stored[2] = count[0], count[1], 1.0 if weak else 0.0
+
+
+@njit(cache=True, error_model="numpy", nogil=True)
+def solve_range(first, last, sizes, table, data, floor, r, u, states, memory):  # noqa: PLR0913
+    """Go on with problems first to last - 1 from r, until they are solved or their limits.
 
     sizes (problems + 1, 3): contacts, blocks and numbers in full rows of W of all before a
-    problem; limits (problems,): sweeps at most; goals: errors; weakest (problems,): error of a
-    contact beyond which the goal is made tighter, as the driver does.  data: arrays of all
-    problems one behind the other, a row of indptr more for each.  Fills r, u, kept (contacts,
-    3), status, sliding (contacts,) and told (problems, 8), see the columns; errors unit of u.
+    problem; table (problems, 11): see the columns.  data: arrays of all problems one behind the
+    other, a row of indptr more for each.  Fills r, u (contacts, 3), states (2, contacts), the
+    status and whether a contact may slide, and what is told; error of the weakest contact inf
+    where a limit was met.  memory: of the sweeps, with room for the largest problem; where one
+    problem goes on, as it was left.
     """
-    indptr, indices, blocks, full, q, kind, parameters, rho, diagonal, eliminated = data
+    indptr, indices, blocks, full, q, kind, parameters, rho, diagonal, eliminated, order = data
+    gram = memory[:GRAM].reshape(DEPTH + 1, DEPTH)
+    watch, stored = memory[GRAM : GRAM + 3], memory[GRAM + 3 : OWN]
     for p in range(first, last):
         a, b, c, d = sizes[p, 0], sizes[p + 1, 0], sizes[p, 1], sizes[p + 1, 1]
-        goal, work, nc = goals[p], np.zeros(1), b - a
+        row, size = table[p], 3 * (b - a)
         by_rows = full[sizes[p, 2] : sizes[p + 1, 2]]
-        rows = by_rows.reshape(nc, 3, 3 * nc) if len(by_rows) else blocks[c:d]
+        rows = by_rows.reshape(b - a, 3, size) if len(by_rows) else blocks[c:d]
         s = Sweep(
             indptr[a + p : b + p + 1], indices[c:d], blocks[c:d], rows, q[a:b], kind[a:b],
-            parameters[a:b], rho[a:b], diagonal[a:b], eliminated[a:b],
-            visits(q[a:b], d - c), EXACT, 1.0, CLOSE, STEPS, work,
+            parameters[a:b], rho[a:b], diagonal[a:b], eliminated[a:b], order[a:b], EXACT, 1.0,
+            CLOSE, STEPS, np.zeros(1),
         )  # fmt: skip
-        x = r[a:b]
-        error = natural_error(s.indptr, s.indices, rows, s.q, s.kind, s.parameters, s.rho, x)
-        told[p, SWEEPS], told[p, START], told[p, CHANGED] = 0.0, error, 0.0
-        history = np.empty((2, DEPTH + 1, 3 * nc))
-        gram, count = np.zeros((DEPTH + 1, DEPTH)), np.zeros(2, dtype=np.int64)
-        left, after = limits[p], x.copy()
-        while True:
-            if not error <= goal and left > 0:
-                watch = np.array([goal, FIRST_JUDGED * goal, math.inf])
-                done = anderson_inplace(s, x, after, history, gram, count, left, watch)
-                left -= done
-                told[p, SWEEPS] += done
-                error = watch[2]
-            told[p, ERROR], told[p, WORK] = error, work[0]
-            if not error <= goal:
-                break
-            while True:
-                found, worst, contact, hidden, changed = assess(
-                    s.indptr, s.indices, rows, s.q, s.kind, s.parameters, s.rho, x,
-                    floor[a:b], u[a:b], kept[a:b], status[a:b], sliding[a:b],
-                )  # fmt: skip
-                told[p, WORST], told[p, CONTACT], told[p, HIDDEN] = worst, contact, hidden
-                if told[p, CHANGED] > 0.0:
-                    error = told[p, ERROR] = found
-                if not changed or not error <= goal:
-                    break
-                told[p, CHANGED] = 1.0
-                copy_rows_inplace(kept[a:b], x)
-                copy_rows_inplace(x, after)
-            if not worst > weakest[p] or left <= 0 or error == 0.0:
-                break
-            goal = min(error * TIGHTER * weakest[p] / worst, TIGHTER * goal)
+        after = memory[OWN : OWN + size].reshape(b - a, 3)
+        history = memory[OWN + size : OWN + VECTORS * size].reshape(2, DEPTH + 1, size)
+        if not row[SWEEPS] < math.inf:
+            _begin(s, row, r[a:b], after, gram, watch, stored)
+        else:
+            s.work[0] = row[WORK]
+            if not stored[2] > 0.0:
+                row[ERROR] = math.inf  # the sweeps ask for it, as they would have
+        _solve(
+            s, row, floor[a:b], r[a:b], u[a:b], states[0, a:b], states[1, a:b], after, history,
+            gram, watch, stored,
+        )  # fmt: skip
 
 
-def _full(problem: FrictionProblem) -> Array:
-    """Numbers of W by full rows, one behind the other; none of another W."""
-    blocks = problem.blocks
-    return blocks.rows.reshape(-1) if blocks.rows is not blocks.data else NO_NUMBERS
+class Read(NamedTuple):
+    """What `solve_range` reads of a problem; sizes (2, 3)."""
+
+    sizes: Counts
+    data: tuple[Any, ...]
+    floor: Array
+
+
+def read_of(problem: FrictionProblem) -> Read:
+    """The arrays of a problem in Delassus form, all read-only: kernels are compiled once."""
+    blocks, data = problem.blocks, problem.kernel_data
+    full = blocks.rows.reshape(-1) if blocks.rows is not blocks.data else NO_NUMBERS
+    order = read_only(visits(data[3], len(blocks.indices)))
+    arrays = *data[:3], full, *data[3:], blocks.diagonal, blocks.eliminated, order
+    sizes = np.array([(0, 0, 0), (problem.contacts, len(blocks.indices), full.size)], np.int64)
+    return Read(sizes, arrays, read_only(np.array(problem.floor)))
 
 
 def _joined(arrays: Sequence[NDArray]) -> NDArray:
@@ -130,59 +227,88 @@ def _joined(arrays: Sequence[NDArray]) -> NDArray:
     return read_only(np.concatenate(arrays))
 
 
+def chunks_of(problem: FrictionProblem, tolerance: float) -> Iterator[int]:
+    """Sweeps of each of the chunks that are made of a problem here."""
+    first, *others = first_chunks(len(problem.blocks.indices), problem.contacts)
+    yield first
+    if is_brief(problem, tolerance) or chunks_alone(problem) > 1:
+        yield from others
+
+
 @dataclass(eq=False)
 class Together:
     """Problems in Delassus form one behind the other, with room for what is found.
 
-    sizes (problems + 1, 3): contacts, blocks and numbers in full rows of all before a problem.
+    sizes (problems + 1, 3): contacts, blocks and numbers in full rows of all before a problem;
+    table (problems, 11): see its columns.
     """
 
     problems: Sequence[FrictionProblem]
     tolerance: float
     r: Array  # starts, then reactions, (contacts, 3)
-    weakest: float = math.inf  # error of a contact from which those that are `brief` go on
+    weakest: float = math.inf  # error of a contact from which those that are light go on
 
     def __post_init__(self) -> None:
-        problems = self.problems
-        ends, limits = [(0, 0, 0)], []
-        for p in problems:
-            contacts, blocks = p.contacts, len(p.blocks.indices)
-            before, full = ends[-1], _full(p).size
-            ends.append((before[0] + contacts, before[1] + blocks, before[2] + full))
-            brief = is_brief(p, self.tolerance)
-            chunks = FIRST_CHUNKS if brief else chunks_alone(p)
-            limits.append(sweeps_of_first_chunks(blocks, contacts, chunks))
-        self.sizes, self.limits = np.array(ends, np.int64), np.array(limits, np.int64)
-        self.beyond = np.array(
-            [self.weakest if is_brief(p, self.tolerance) else math.inf for p in problems]
-        )
-        self.norms = np.array([p.q_norm for p in problems])
-        kernels = [
-            (*p.kernel_data[:3], _full(p), *p.kernel_data[3:], p.blocks.diagonal,
-             p.blocks.eliminated) for p in problems
-        ]  # fmt: skip
-        if len(kernels) == 1:
-            self.data = kernels[0]
+        reads = [problem.kept_alone(read_of) for problem in self.problems]
+        if len(reads) == 1:
+            self.sizes, self.data, self.floor = reads[0]
         else:
-            self.data = tuple(_joined(x) for x in zip(*kernels, strict=True))
-        # of one type for one problem and for many: two compilations may round differently
-        self.floor = np.concatenate([p.floor for p in problems])
-        total = len(self.r)
-        self.u, self.kept = np.empty((2, total, 3))
-        self.status, self.sliding = np.empty((2, total), np.int8)
-        self.told = np.empty((len(problems), 8))
-        self.told.fill(math.inf)
+            ends = np.cumsum([read.sizes[1] for read in reads], axis=0)
+            self.sizes = np.concatenate([reads[0].sizes[:1], ends])
+            self.data = tuple(
+                _joined(same) for same in zip(*(read.data for read in reads), strict=True)
+            )
+            self.floor = _joined([read.floor for read in reads])
+        self.table = np.array([self._row(problem) for problem in self.problems])
+        self.u, self.states = np.empty((len(self.r), 3)), np.empty((2, len(self.r)), np.int8)
+
+    def _row(self, problem: FrictionProblem) -> list[float]:
+        weakest = self.weakest if is_light(problem) else math.inf
+        return [0.0, self.tolerance * problem.q_norm, weakest, *NOTHING]
 
     def solve(self, first: int, last: int) -> None:
-        """Solve some of the problems."""
+        """Solve some of the problems as far as the first stage goes."""
+        for p in range(first, last):
+            self.table[p, LIMIT] = sum(chunks_of(self.problems[p], self.tolerance))
+        largest = max(problem.contacts for problem in self.problems[first:last])
+        self._go_on(first, last, np.empty(OWN + 3 * VECTORS * largest))
+
+    @cached_property
+    def memory(self) -> Array:
+        """That of the sweeps of a problem that is alone."""
+        return np.empty(OWN + VECTORS * self.r.size)
+
+    def _go_on(self, first: int, last: int, memory: Array) -> None:
         solve_range(
-            first, last, self.sizes, self.limits, self.tolerance * self.norms, self.beyond,
-            self.data, self.floor, self.r, self.u, self.kept, self.status, self.sliding,
-            self.told,
+            first, last, self.sizes, self.table, self.data, self.floor, self.r, self.u,
+            self.states, memory,
+        )  # fmt: skip
+
+    def chunks(self) -> Iterator[None]:
+        """Solve a problem that is alone, chunk by chunk."""
+        for sweeps in chunks_of(self.problems[0], self.tolerance):
+            self.table[0, LIMIT] += sweeps
+            self._go_on(0, 1, self.memory)
+            yield
+
+    def swept(self, before: Sequence[Swept]) -> Swept:
+        """The last chunk of a problem that is alone, after those before it."""
+        sweeps = int(self.table[0, SWEEPS]) - sum(chunk.sweeps for chunk in before)
+        flops = self.flops(0) - sum(chunk.flops for chunk in before)
+        return Swept(self.r.copy(), sweeps, flops, float(self.table[0, ERROR]))
+
+    def begun(self, start: Array, chunks: list[Swept]) -> Begun:
+        """What there is to go on from, of a problem that is alone."""
+        own, size = self.memory[:OWN], self.r.size
+        vectors = self.memory[OWN:].reshape(VECTORS, size)
+        return Begun(
+            start, chunks, vectors[0].reshape(-1, 3), vectors[1:].reshape(2, DEPTH + 1, size),
+            own[:GRAM].reshape(DEPTH + 1, DEPTH), own[GRAM + 3 : OWN - 1].astype(np.int64),
+            own[GRAM : GRAM + 3],
         )  # fmt: skip
 
     def flops(self, p: int) -> float:
         """Floating point operations of the sweeps on a problem, once they are done."""
         contacts, blocks = self.problems[p].contacts, len(self.problems[p].blocks.indices)
         each = flops_of_sweep(blocks, contacts) + flops_of_acceleration(3 * contacts, DEPTH)
-        return float(self.told[p, SWEEPS]) * each + float(self.told[p, WORK])
+        return float(self.table[p, SWEEPS]) * each + float(self.table[p, WORK])

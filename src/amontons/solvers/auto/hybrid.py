@@ -38,6 +38,8 @@ from collections.abc import Iterator
 from dataclasses import dataclass, field, replace
 from typing import ClassVar, NamedTuple
 
+import numpy as np
+
 from ...core.errors import InvalidInput, SingularOperator
 from ...core.options import check_options
 from ...linear import Direct
@@ -69,6 +71,7 @@ from ..sweeps.gauss_seidel import GaussSeidel
 from ..sweeps.rolling import RollingSweeps
 from .compressed import CompressedDelassus
 from .portfolio import Portfolio
+from .state import Begun
 from .tethers import Tethers
 
 MESH = 3_000  # unknowns of a mesh from which multigrid beats a factorisation
@@ -179,6 +182,22 @@ class Auto:
             yield from _of_global_form(problem, start, target)
         elif problem.contacts:
             yield from _stages(problem, start, target)
+
+
+@dataclass(frozen=True)
+class Continued(Auto):
+    """Auto where the first stage has begun: the race goes on from there."""
+
+    begun: Begun
+
+    def iterates(
+        self, problem: FrictionProblem | NitscheProblem, start: Iterate, target: Target
+    ) -> Iterates:
+        """As of Auto; from another start nothing has begun."""
+        assert isinstance(problem, FrictionProblem)
+        r = spatial(start.r)
+        begun = self.begun if np.array_equal(r, self.begun.start) else None
+        yield from Portfolio(problem, target, r, begun=begun).iterates()
 
 
 def _of_global_form(problem: FrictionProblem, start: Iterate, target: Target) -> Iterates:

@@ -39,7 +39,7 @@ from .stages import (
     proximal_point,
     semismooth_steps,
 )
-from .state import DENSE, State
+from .state import DENSE, Begun, State
 from .tracks import (
     LEAST,
     alternating,
@@ -158,13 +158,15 @@ TRACKS = (
 
 @dataclass(eq=False)
 class Portfolio:
-    """One run of a table of tracks from a reaction r, (nc, 3)."""
+    """One run of a table of tracks from a reaction r, (nc, 3); begun: what was done from it."""
 
     problem: FrictionProblem
     target: Target
     r: Array
     table: tuple[Entry, ...] = TRACKS
+    begun: Begun | None = None
 
     def iterates(self) -> Iterates:
         """The best reaction after every chunk of a track."""
-        return Race(State(self.problem, self.target, self.r), self.table).iterates()
+        state = State(self.problem, self.target, self.r, begun=self.begun)
+        return Race(state, self.table).iterates()

@@ -8,12 +8,14 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass, replace
 from functools import cached_property, lru_cache
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ...core.compiled import njit
 from ...linear.block_kernels import is_full
+from ...linear.chunks import LEAST_ENTRIES
 from ...problem.friction import FrictionProblem
 from ...problem.judge.measures import natural_error
 from ...problem.law import Coulomb
@@ -23,6 +25,7 @@ from ..newton.inexact import InexactNewton
 from ..newton.joints import Joints
 from ..newton.semismooth import Condensed, SemismoothNewton
 from ..newton.smoothing import Workspace
+from ..sweeps.chunks import SPARSE
 from ..sweeps.kernels import SweepOrder, by_approach, sweep_data
 
 Array = NDArray[np.float64]
@@ -40,6 +43,7 @@ DENSE_STEP = 0.05  # per cube of the unknowns
 LIGHT = 1e6  # nanoseconds of a step up to which its cost is told without looking for faces
 DENSE = 0.5  # share of blocks of W above which it comes from a mesh
 SHORT = 5e3  # nanoseconds of a sweep of a problem that is brief whatever its tolerance
+LIGHT_SWEEP = 2.5e5  # nanoseconds of a sweep up to which a chunk is no time to press Ctrl-C
 COARSE, BLOCKS = 1e-4, 10_000  # tolerance from which, blocks of W to which larger ones are
 SIZES = 4096  # of problems whose counts are kept: time steps have the same again and again
 FIRST_CHUNKS = 3  # of the first track before its rate counts
@@ -71,8 +75,8 @@ def nanoseconds_of_sweep(blocks: int, contacts: int, more: float = 0.0) -> float
 def is_brief(problem: FrictionProblem, tolerance: float) -> bool:
     """True where the first chunks of the first track are likely to be all that a problem needs.
 
-    They are made compiled then, and once more if they are not: where they are few and as cheap
-    as the calls of the race, or where the goal is so near that most problems reach it in them.
+    No stack is looked for then: where they are few and as cheap as the calls of the race, or
+    where the goal is so near that most problems reach it in them.
     """
     blocks = len(problem.blocks.indices)
     if _is_short(blocks, problem.contacts):
@@ -86,6 +90,17 @@ def _is_short(blocks: int, contacts: int) -> bool:
     return nanoseconds_of_sweep(blocks, contacts, HISTORY_CONTACT) <= SHORT
 
 
+def is_light(problem: FrictionProblem) -> bool:
+    """True where the first chunks of the first track are made compiled, in one thread."""
+    return _is_light(len(problem.blocks.indices), problem.contacts)
+
+
+@lru_cache(maxsize=SIZES)
+def _is_light(blocks: int, contacts: int) -> bool:
+    shared = blocks >= LEAST_ENTRIES and blocks <= SPARSE * contacts**2
+    return not shared and nanoseconds_of_sweep(blocks, contacts, HISTORY_CONTACT) <= LIGHT_SWEEP
+
+
 def is_stacked(problem: FrictionProblem) -> bool:
     """True under Coulomb's law where most contacts share faces of rigid bodies.
 
@@ -93,6 +108,31 @@ def is_stacked(problem: FrictionProblem) -> bool:
     """
     has_relaxations = isinstance(problem.law, Coulomb) and not problem.gains_energy
     return has_relaxations and are_shared(problem)
+
+
+class Swept(NamedTuple):
+    """A chunk of sweeps: r (nc, 3), how many, their operations, the error of r, unit of u."""
+
+    r: Array
+    sweeps: int
+    flops: float
+    error: float
+
+
+class Begun(NamedTuple):
+    """The first chunks of accelerated sweeps from a start, (nc, 3), and where they are.
+
+    x (nc, 3), history, gram, stored: as of `anderson_inplace`, stored being its count; watch:
+    see `watch_for`.
+    """
+
+    start: Array
+    chunks: list[Swept]
+    x: Array
+    history: Array
+    gram: Array
+    stored: NDArray[np.int64]
+    watch: Array
 
 
 @dataclass(eq=False)
@@ -105,6 +145,7 @@ class State:
     error: float = math.inf  # of r, unit of u
     latest: float = math.inf  # of the last reaction tried
     unsaid: float = 0.0  # operations that no iterate has told yet
+    begun: Begun | None = None  # what the first track has done already
 
     def __post_init__(self) -> None:
         self.start = self.swept = self.r  # swept: the best reaction of sweeps

@@ -68,10 +68,16 @@ def anderson(state: State) -> Chunks:
     """Accelerated sweeps, contacts in the order of their approach.
 
     They go on from the best reaction of the others where that is far better than theirs.
+    What the first stage has done is taken from there.
     """
     memory, watch = Acceleration(state.data, state.start, DEPTH), watch_for(state.goal)
-    cost = state.accelerated_cost
+    cost, begun = state.accelerated_cost, state.begun
     turn = yield Chunk(memory.r, 0, 0.0)
+    if begun is not None:
+        for r, count, flops, error in begun.chunks:
+            turn = yield Chunk(r, count, cost * count, flops, error)
+        memory.x, memory.history, memory.gram, memory.count = begun[2:6]
+        memory.r, watch = begun.chunks[-1].r.copy(), begun.watch
     while True:
         if state.error < TAKEN * turn.error:
             memory, watch = Acceleration(state.data, state.r, DEPTH), watch_for(state.goal)

@@ -59,6 +59,7 @@ SLOWEST = 1e-9  # approach, relative to the fastest, below which contacts count 
 FIRST_JUDGED = 10.0  # change, in goals, at which the judge is asked first: sweeps may be quick
 SAFETY = 0.95  # of the change at which the judge is asked again
 BLOCK_FLOPS, CONTACT_FLOPS = 18, 16  # of a sweep: per block of W, per contact besides
+WAITING = 1.02  # growth of that change with every sweep: error and change may part on plateaus
 LEAST = 1e-3  # factor by which that change falls at most from one judgement to the next
 
 
@@ -210,6 +211,7 @@ def sweep_inplace(s, backward, r):
 def content(s, r, change, watch):
     """True when the error is at most watch[0]; see `watch_for`."""
     if not change <= watch[1]:
+        watch[1] *= WAITING
         return False
     if watch[0] > 0.0:
         s.work[0] += JUDGE_FLOPS[0] * len(s.indices) + JUDGE_FLOPS[1] * len(s.kind)

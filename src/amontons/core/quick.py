@@ -1,0 +1,17 @@
+"""Records made quickly: where a whole solve takes 60 microseconds, two records took five."""
+
+from __future__ import annotations
+
+from typing import Any, TypeVar
+
+T = TypeVar("T")
+
+
+def made(kind: type[T], /, **fields: Any) -> T:
+    """An instance of a frozen dataclass without slots; defaults of what is not given.
+
+    Neither `__init__` nor `__post_init__` runs: a frozen one sets each field by a call.
+    """
+    out = object.__new__(kind)
+    out.__dict__.update(fields)
+    return out
