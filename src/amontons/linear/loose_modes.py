@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -34,6 +36,21 @@ def loose_modes(M: object, bodies: Bodies, modes: Array | None) -> Array:
             energy, vectors = eigh(0.5 * (resistance + resistance.T))
             found.append(whole @ vectors[:, energy <= RESISTS * size])
     return np.concatenate(found, axis=1)
+
+
+def unresisted(M: Any, modes: Array) -> Array:
+    """What the columns of modes (n, k), orthonormal, without energy, span of R^T M = 0.
+
+    All of them where M (n, n) is symmetric and positive semidefinite.  Tangents of bodies under
+    stress, and of loads that follow them, resist motions that take no energy.
+    """
+    forces = M.T @ modes
+    size = float(np.abs(M.diagonal()).max(initial=0.0))
+    most = RESISTS**0.5 * size  # what energies that are no more than rounding may leave
+    if float(np.linalg.norm(forces)) <= most:
+        return modes
+    _, sizes, right = np.linalg.svd(forces, full_matrices=False)
+    return modes @ right[sizes <= most].T
 
 
 def _basis(modes: Array) -> Array:

@@ -333,7 +333,7 @@ class Equations(Matrices):
         A loose body is one that contact alone holds; 0 where there is none, and in the Delassus
         form, which has none.
         """
-        modes = self.loose_modes
+        modes = self.matrices.balanced_modes if self.loose_modes.shape[1] else self.loose_modes
         if modes.shape[1] == 0:
             return 0.0
         assert self.f is not None and self.H is not None

@@ -31,7 +31,7 @@ from ..linear.geometric import MultigridFactor, prepared
 from ..linear.grid_matrix import GridMatrix
 from ..linear.hierarchy import Hierarchy
 from ..linear.levels import Levels
-from ..linear.loose_modes import loose_modes
+from ..linear.loose_modes import loose_modes, unresisted
 from ..linear.small_blocks import block_diagonal_inverse, diagonal_blocks_inverse
 from .condensation import SOLVE_COLUMNS, Condensation
 from .structure import Structure
@@ -124,6 +124,13 @@ class GlobalMatrices:
     def loose_modes(self) -> Array:
         """Rigid modes that M does not resist, orthonormal columns (n, k), see `linear`."""
         return self._of_M(loose_modes, self.M, self.bodies, self.modes)
+
+    @property
+    def balanced_modes(self) -> Array:
+        """Those of them along which no motion changes the balance of forces: R^T M = 0."""
+        if isinstance(self.M, OPERATORS):  # symmetric
+            return self.loose_modes
+        return self._of_M(unresisted, self.M, self.loose_modes)
 
     def solve(self, b: Array) -> Array:
         """M^-1 b, b of shape (n,) or (n, k)."""

@@ -118,6 +118,34 @@ def test_tangents_are_exact_in_2d_and_second_order():
     assert checked(curved, 7, draws=4, size=0.005) > 2
 
 
+def with_held_side(law):
+    """The plates with slave nodes of one edge, and all of the side above, held along x."""
+    model = slider((0, 0, -PRESS), law)
+    return am.Model(model.bodies, [*model.supports, am.Fix("upper.left", (0, None, None))],
+                    model.contacts)  # fmt: skip
+
+
+@pytest.mark.parametrize("law", LAWS[1:3])
+def test_tangents_are_exact_where_supports_hold_springs(law):
+    assert checked(with_held_side(law), 3, draws=6) > 3
+
+
+def test_supports_take_what_springs_are_drawn_in_their_direction():
+    """Else law and judge speak of a slip there that no unknown can change."""
+    model = with_held_side({"mu": 0.3, "stick_stiffness": 2.0, "stiffness": 50.0})
+    parts = large_deformation(model).parts
+    load, prescribed = np.zeros(parts.X.size), model.discretisation.prescribed
+    drawn = np.full((len(parts.at), 2), 0.002)
+    solution = am.solve(large_step(model, load, prescribed, drawn=drawn), tolerance=1e-10)
+    assert solution.converged
+    axes = large_deformation(model).contact_point(solution.v).meeting.frames
+    slip = np.einsum("pk,pkc->pc", solution.u[:, 1:], axes[:, 1:])
+    held = ~parts.contact.free
+    assert held.any()
+    np.testing.assert_allclose(slip[held], 0.0, atol=1e-15)
+    assert (np.linalg.norm(slip, axis=1) > 1e-3).all()  # along the other direction
+
+
 def rotated(model, turn):
     """The same model with everything turned."""
     bodies = [am.Body(am.Mesh(b.mesh.points @ turn.T, b.mesh.cells, b.mesh.surfaces),

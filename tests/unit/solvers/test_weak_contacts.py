@@ -250,6 +250,17 @@ def test_no_body_is_out_of_balance():
     assert problem.unbalanced(r) < 1
 
 
+@pytest.mark.parametrize("load", [am.Pressure("top", 1.0), am.Traction("top", (0, -1.0))],
+                         ids=["follows", "dead"])  # fmt: skip
+def test_stresses_and_loads_that_follow_are_no_loss_of_balance(load):
+    """Tangents of a pressed block: turning it takes no energy, but moves what presses on it."""
+    block = am.Body(am.box((1, 1), 2), am.SaintVenantKirchhoff(100.0, 0.3))
+    floor = am.Contact("bottom", am.Plane((0, 1)), mu=0.5)
+    found = am.solve(am.Model([block], [], [floor], [load])).solution
+    assert found.problem.loose_modes.shape[1] > 0
+    assert found.problem.error(found.r, found.v) < 1e-10
+
+
 @pytest.mark.parametrize("tolerance", [1e-3, 1e-8])
 @pytest.mark.parametrize("push", [1.0, 1e-2, 1e-4])
 def test_pushed_block_that_contact_alone_holds(push, tolerance):

@@ -20,8 +20,9 @@ much is no slip: z_T (1 - rho a / |z_T|), zero where negative, is in the place o
 (2) is zero where friction opposes what is left of the motion, s_T (1 - a / |s_T|), and none is
 up to there: the proximal map of mu N max(|s_T| - a, 0) in the place of that of mu N |s_T|.
 
-Components that supports prescribe are left out: lambda and s count as zero there, the support
-takes them.  Orthotropic friction, and springs along the surface, are `framed_point`.
+Components that supports prescribe are left out: lambda and s, with what springs were drawn by,
+count as zero there, the support takes them.  Orthotropic friction, and springs along the
+surface, are `framed_point`.
 
 [AC] P. Alart, A. Curnier, CMAME 92 (1991).
 [LR] T. Ligurský, Y. Renard, CMAME 280 (2014).
@@ -42,6 +43,7 @@ from ...problem.law.states import OPEN, SLIP, STICK
 from .closing import left, slope_of_left
 from .current_pairs import Meetings, Pair
 from .fading import Mixture
+from .surface_axes import still_drawn
 
 Array = NDArray[np.float64]
 Pieces = NDArray[np.int8]
@@ -110,7 +112,7 @@ class CurrentContact:
             u[:, 1:] += (1 - left(z, self.rho * play))[:, None] * z / self.rho[:, None]
         u[:, 0] = meeting.gap if mixed is None else mixed.gap
         if drawn is not None:
-            u[:, 1:] += drawn
+            u[:, 1:] += still_drawn(drawn, axes, self.free)
         return r, u, axes
 
     def at(

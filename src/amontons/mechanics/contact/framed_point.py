@@ -17,7 +17,8 @@ springs they would jump across it, to and fro.
 
 As (2) is a law of the components in the frame, turning all of lambda, s and a turns it as well.
 With w the spin of the frame, R_lambda and R_s the derivatives of (2) at a fixed frame, and s
-without q, which turns with the frame,
+without q, which turns with the frame (but where supports hold some of its components: what is
+left then changes by these of w x q alone),
 
     d law = R_lambda (d lambda - w x lambda) + R_s (ds - w x s) + w x law + R_g dg.         (3)
 """
@@ -67,11 +68,17 @@ class FramedPoint(ContactPoint):
         return tuple(map(self._spread, out))  # type: ignore[return-value]
 
     @cached_property
-    def _slip(self) -> Array:
-        """s + q, (nc, d)."""
+    def _pulled(self) -> Array | None:
+        """q in global axes, (nc, d), of all components."""
         if self.drawn is None:
-            return self.motion
-        return self.motion + np.einsum("pk,pkc->pc", self.drawn, self._in_plane)
+            return None
+        return np.einsum("pk,pkc->pc", self.drawn, self._in_plane)
+
+    @cached_property
+    def _slip(self) -> Array:
+        """s + q, (nc, d), without components that supports hold."""
+        pulled = self._pulled
+        return self.motion if pulled is None else self.motion + pulled * self.contact.free
 
     @cached_property
     def z_tangent(self) -> Array:
@@ -110,6 +117,9 @@ class FramedPoint(ContactPoint):
         """What (3) has of the spin, by n (nc, d, d) and by E (nc, d, 2 d)."""
         n, d = self.n, self.n.shape[1]
         by_spin = by_force @ _cross(self.force) + by_motion @ _cross(self.motion) - _cross(law)
+        if self._pulled is not None and not (free := self.contact.free).all():
+            turned = free[:, :, None] * _cross(self._pulled)  # what is held does not turn
+            by_spin += by_motion @ (_cross(self._pulled * free) - turned)
         if d == 2:
             return -by_spin * self.meeting.frames[:, 1, None, :], np.zeros((len(n), 2, 0))
         by_normal, by_axis = twist(n, self.meeting.along, self.meeting.frames)

@@ -129,3 +129,15 @@ def _in_plane(normals: Array, along: Array) -> tuple[Array, Array]:
     D = one - normals * (normals * one).sum(axis=1)[:, None] - np.cross(normals, two)
     length = np.linalg.norm(D, axis=1)
     return D, np.where(length > UPRIGHT * np.linalg.norm(along, axis=(1, 2)), length, 0.0)
+
+
+def still_drawn(drawn: Array, axes: Array, free: NDArray[np.bool_]) -> Array:
+    """How far springs are drawn along t1(, t2), (nc, d-1), without what supports hold.
+
+    axes (nc, d, d): the frames; free (nc, d): components without a support.
+    """
+    if free.all():
+        return drawn
+    across = axes[:, 1:]
+    left = np.einsum("pk,pkc->pc", drawn, across) * free
+    return np.einsum("pkc,pc->pk", across, left)

@@ -17,6 +17,7 @@ from ...problem.law.law import MU
 from ...problem.solution import FrictionSolution
 from ..contact.closing import slid_while_open
 from ..contact.current_mortar import MortarMeeting
+from ..contact.surface_axes import still_drawn
 from ..model import Model
 from ..model.diagnosis import with_diagnosis
 from ..model.large_deformation import LargeDeformation, large_step
@@ -82,6 +83,8 @@ class LargeSlowModel:
         q1 = problem.displacement(solution.v).ravel()
         meeting = problem.contact_point(solution.v).meeting
         axes = meeting.frames
+        if drawn is not None:
+            drawn = still_drawn(drawn, axes, problem.parts.contact.free)
         tied = body.law.tied[:, None]  # what bonds give way is no slip
         way = solution.u[:, 1:] if drawn is None else solution.u[:, 1:] - drawn
         slid = way if drawn is None else Springs.of(body.law, axes.shape[1]).slipped(

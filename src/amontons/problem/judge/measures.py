@@ -9,7 +9,7 @@ and does not change with units.  With û = u + mu |u_T| n (Coulomb) or u (Tresca
 *residual*:  rho_i = 1 / |H_i^T D^-1 H_i|_2 with D the block diagonal of M, u = H^T v + w,
              error = max(|M v - H r - f| / |load|,
                          |(r_i - P(r_i - rho_i û_i)) / rho_i| / |u_ref|).
-             With rigid modes R of bodies that contact alone holds, M R = 0, it is at least
+             With rigid modes R of bodies that contact alone holds, R^T M = 0, it is at least
              |R_k^T (H r + f)| / (|R_k^T f| + |R_k^T H| |r|): no large load elsewhere hides
              a body that is out of balance.
 *nitsche*:   where v alone is unknown, see `nitsche`.
