@@ -15,7 +15,7 @@ from scipy import sparse
 
 from ...problem.law.rolling import RollingFriction
 from ...problem.rolling import RollingProblem
-from .rows import Rows, levers_of
+from .rows import Mobility, Rows, levers_of
 
 if TYPE_CHECKING:
     from .bodies import RigidBodies
@@ -38,17 +38,14 @@ def lever_matrix(levers: Array, sides: Index, bodies: int) -> Any:
 
 
 def rolling_problem(
-    system: RigidBodies, rows: Rows, R: Array, bodies: tuple[Array, Array, Array], q: Array,
-    spin: Array,
+    system: RigidBodies, rows: Rows, mobility: Mobility, q: Array, omega: Array,
 ) -> RollingProblem:  # fmt: skip
-    """Of contacts with free velocities q (nc, 3); spin (b, 3): the free one in own axes."""
-    masses, _, own = bodies
-    inverse = R @ own @ R.swapaxes(1, 2)
+    """Of contacts with free velocities q (nc, 3); omega (b, 3): free, in global axes."""
+    masses, inverse = mobility
     nc, count = len(q), len(masses)
     levers = np.zeros((nc, 2, 6, 6))
     levers[:, :, :3] = levers_of(*rows, masses, inverse)
     C = np.linalg.cholesky(inverse)
-    omega = np.einsum("bij,bj->bi", R, spin)
     turning = np.zeros((nc, 3))
     for side, (body, sign) in enumerate(((rows.slave, 1.0), (rows.master, -1.0))):
         has = body >= 0
