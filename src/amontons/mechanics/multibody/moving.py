@@ -342,7 +342,7 @@ class _Stepping:
         what: str, deadline: Deadline,
     ) -> FrictionSolution:  # fmt: skip
         """Impulses and moments, (nc, 6), where contacts resist rolling or spinning."""
-        problem = rolling_problem(self.system, at.rows, mobility, posed.q, omega)
+        problem = rolling_problem(self.system, at.rows, mobility, posed, omega)
         moments = np.zeros((len(at.keys), 3))
         if len(state.moments):
             matched(at.keys, state.keys, state.moments, moments)

@@ -11,10 +11,11 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy import sparse
 
+from ...core.compiled import njit
 from ...problem.law.rolling import RollingFriction
 from ...problem.rolling import RollingProblem
+from .quick import Posed
 from .rows import Mobility, Rows, levers_of
 
 if TYPE_CHECKING:
@@ -24,25 +25,31 @@ Array = NDArray[np.float64]
 Index = NDArray[np.int64]
 
 
-def lever_matrix(levers: Array, sides: Index, bodies: int) -> Any:
-    """Sparse G (k n, 6 bodies) of levers (n, 2, k, 6) on the bodies sides (n, 2), < 0 none."""
-    n, _, k, _ = levers.shape
-    contact, side = np.nonzero(sides >= 0)
-    shape = len(contact), k, 6
-    row = np.broadcast_to((k * contact[:, None] + np.arange(k))[:, :, None], shape)
-    column = 6 * sides[contact, side][:, None] + np.arange(6)
-    column = np.broadcast_to(column[:, None, :], shape)
-    values = levers[contact, side].ravel()
-    size = k * n, 6 * bodies
-    return sparse.coo_array((values, (row.ravel(), column.ravel())), size).tocsr()
+@njit(cache=True, error_model="numpy")
+def _blocks_of(slave, master, levers, indptr, indices):
+    """G G^T (nb, 6, 6) of levers (n, 2, 6, 6), in rows of blocks."""
+    data = np.zeros((len(indices), 6, 6))
+    for i in range(len(slave)):
+        for place in range(indptr[i], indptr[i + 1]):
+            j = indices[place]
+            for p in range(2):
+                b = slave[i] if p == 0 else master[i]
+                for s in range(2):
+                    if b < 0 or b != (slave[j] if s == 0 else master[j]):
+                        continue
+                    for a in range(6):
+                        for c in range(6):
+                            for k in range(6):
+                                data[place, a, c] += levers[i, p, a, k] * levers[j, s, c, k]
+    return data
 
 
 def rolling_problem(
-    system: RigidBodies, rows: Rows, mobility: Mobility, q: Array, omega: Array,
+    system: RigidBodies, rows: Rows, mobility: Mobility, posed: Posed, omega: Array,
 ) -> RollingProblem:  # fmt: skip
-    """Of contacts with free velocities q (nc, 3); omega (b, 3): free, in global axes."""
+    """Of contacts posed without moments; omega (b, 3): free, in global axes."""
     masses, inverse = mobility
-    nc, count = len(q), len(masses)
+    nc = len(posed.q)
     levers = np.zeros((nc, 2, 6, 6))
     levers[:, :, :3] = levers_of(*rows, masses, inverse)
     C = np.linalg.cholesky(inverse)
@@ -52,10 +59,11 @@ def rolling_problem(
         axes = rows.axes[has]
         levers[has, side, 3:, 3:] = sign * axes @ C[body[has]]
         turning[has] += sign * np.einsum("cij,cj->ci", axes, omega[body[has]])
-    G = lever_matrix(levers, np.stack([rows.slave, rows.master], axis=1), count)
+    pattern = posed.indptr, posed.indices
     lengths = system.mu, system.rolling, system.torsion
     law = RollingFriction(*(np.full(nc, value) for value in lengths))
-    return RollingProblem(G @ G.T, np.hstack([q, turning]), law)
+    blocks = *pattern, _blocks_of(rows.slave, rows.master, levers, *pattern)
+    return RollingProblem._from_blocks(blocks, np.hstack([posed.q, turning]), law)
 
 
 def couples(rows: Rows, moments: Array, bodies: int) -> Array:
