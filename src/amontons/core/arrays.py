@@ -85,6 +85,11 @@ def number(name: str, value: object, *, least: float = -LARGEST) -> float:
         ) from None
     if found.ndim:
         raise InvalidInput(f"{name}: expected a number, got {shown(value)}")
+    if np.isfinite(found) and abs(found) > LARGEST:
+        raise InvalidInput(
+            f"{name}: expected a number up to {LARGEST:g} in size, whose square is a number "
+            f"too, got {shown(value)}; take larger units"
+        )
     if not least <= found <= LARGEST:
         bound = f" from {least:g} to {LARGEST:g}" if least > -LARGEST else ""
         raise InvalidInput(f"{name}: expected a finite number{bound}, got {shown(value)}")

@@ -32,6 +32,7 @@ from .settling import Accepted, Motion, Settled
 
 Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]
+Blocks = tuple[NDArray[np.int32], NDArray[np.int32], Array]  # indptr, indices, (nb, 6, 6)
 PLACES = {3: (0, 1, 4), 5: (0, 1, 2, 4, 5), 6: (0, 1, 2, 3, 4, 5)}  # of rows among six
 MOMENTS = slice(3, 6)
 
@@ -109,6 +110,15 @@ class RollingProblem(Problem):
         for key, value in (("q", q), ("law", law), ("W", W.tocsr())):
             object.__setattr__(self, key, value)
 
+    @classmethod
+    def _from_blocks(cls, blocks: Blocks, q: Array, law: RollingFriction) -> RollingProblem:
+        """Of six rows, with W in rows of blocks that are known to be right, not copied."""
+        indptr, indices, data = blocks
+        W = sparse.bsr_array((data, indices, indptr), shape=(q.size, q.size)).tocsr()
+        problem = object.__new__(cls)
+        vars(problem).update(W=W, q=read_only(q), law=law, name="", _blocks=blocks)
+        return problem
+
     def __repr__(self) -> str:
         return f"RollingProblem({len(self.law)} contacts of {self.rows} rows)"
 
@@ -161,28 +171,32 @@ class RollingProblem(Problem):
     def kernel_data(self) -> RollingData:
         """In lengths of each contact, rows that it has not being zero."""
         nc, places = len(self.lengths), np.array(PLACES[self.rows])
-        at = (ROWS * np.arange(nc)[:, None] + places).ravel()
-        scale = self.factors.ravel()[at]
-        D = sparse.coo_array(
-            (scale, (at, np.arange(len(at)))), shape=(ROWS * nc, len(at))
-        )
-        W = (D @ self.W @ D.T).tobsr((ROWS, ROWS))  # type: ignore[operator]
-        W.sort_indices()
+        indptr, indices, data = self._blocks
+        row, factors = np.repeat(np.arange(nc), np.diff(indptr)), self.factors
+        data = data * factors[row][:, :, None] * factors[indices][:, None, :]
         q = np.zeros((nc, ROWS))
         q[:, places] = np.asarray(self.q) * self.factors[:, places]
         diagonal = np.full(nc, -1, np.int32)
-        row = np.repeat(np.arange(nc), np.diff(W.indptr))
-        own = row == W.indices
+        own = row == indices
         diagonal[row[own]] = np.flatnonzero(own)
         rho = np.zeros(nc)
-        largest = np.linalg.eigvalsh(W.data[own])[:, -1] if own.any() else np.zeros(0)
+        largest = np.linalg.eigvalsh(data[own])[:, -1] if own.any() else np.zeros(0)
         rho[row[own]] = np.where(largest > 0, 1.0 / np.where(largest > 0, largest, 1.0), 0.0)
         coefficients = self.law.coefficients
         coefficients[:, 1:] /= self.lengths[:, None]
-        return RollingData(
-            W.indptr.astype(np.int32), W.indices.astype(np.int32), np.ascontiguousarray(W.data),
-            q, coefficients, rho, diagonal,
-        )  # fmt: skip
+        return RollingData(indptr, indices, data, q, coefficients, rho, diagonal)
+
+    @cached_property
+    def _blocks(self) -> Blocks:
+        """W in rows of 6x6 blocks, rows that it has not being zero."""
+        nc, places = len(self.law), np.array(PLACES[self.rows])
+        at = (ROWS * np.arange(nc)[:, None] + places).ravel()
+        shape = ROWS * nc, len(at)
+        E = sparse.coo_array((np.ones(len(at)), (at, np.arange(len(at)))), shape=shape)
+        W = (E @ self.W @ E.T).tobsr((ROWS, ROWS))  # type: ignore[operator]
+        W.sort_indices()
+        indptr, indices = W.indptr.astype(np.int32), W.indices.astype(np.int32)
+        return indptr, indices, np.ascontiguousarray(W.data)
 
     def six(self, r: Array) -> Array:
         """Reactions (nc, d) as kernels take them, (nc, 6)."""
@@ -227,8 +241,9 @@ class RollingProblem(Problem):
             return None
         k = self.kernel_data
         missed = np.linalg.norm(self._missed(r)[0], axis=1)
-        W = sparse.bsr_array((np.abs(k.data), k.indices, k.indptr), shape=(k.q.size, k.q.size))
-        pushes = (W @ np.abs(self.six(r)).ravel()).reshape(k.q.shape)
+        pushes, none = np.empty_like(k.q), np.zeros_like(k.q)
+        size = np.abs(k.data), none, np.abs(self.six(r))
+        velocities_inplace(k.indptr, k.indices, *size, pushes)
         scale = np.linalg.norm(k.q, axis=1) + np.linalg.norm(pushes, axis=1)
         share = np.where(missed > 0, missed / np.where(scale > 0, scale, 1.0), 0.0)
         share = np.where((missed > 0) & (scale <= 0), np.inf, share)

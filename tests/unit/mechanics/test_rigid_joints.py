@@ -8,7 +8,7 @@ from scipy import integrate
 
 import amontons as am
 from amontons.mechanics.multibody import GROUND, Joint, RigidBodies, RigidBody, cuboid
-from amontons.mechanics.multibody.guides import between_planes
+from amontons.mechanics.multibody.guides import Guides
 from amontons.mechanics.multibody.rows import Rows
 
 FLOOR = am.Plane((0, 0, 1))
@@ -271,7 +271,8 @@ def test_perpendicular_walls_do_not_face_each_other():
     def faces(normals):
         axes = np.stack([np.stack([n, n, n]) for n in normals])
         rows = Rows(at, at - 1, axes, np.zeros((2, 3)), np.zeros((2, 3)))
-        return between_planes(rows, 2, normals, 1)
+        guides = Guides.of(normals)
+        return guides is not None and guides.hold(rows, 2, 1)
 
     assert not faces(turned)
     assert faces(np.array([turned[0], -turned[0]]))

@@ -373,7 +373,7 @@ def test_bad_steps_are_refused_by_name(options, match):
     [({"density": 0}, "density"), ({"position": (0, 1)}, "position"),
      ({"orientation": (0, 0, 0, 0)}, "orientation"), ({"velocity": (0, 0, np.nan)}, "velocity"),
      ({"shape": "ball"}, "shape"), ({"shape": cuboid((1, 1e-9, 1e-9))}, "shape: .* thicker"),
-     ({"density": 1e-320}, "moments")],
+     ({"density": 1e-320}, "moments"), ({"density": 1e300}, r"up to 1e\+100 in size")],
 )  # fmt: skip
 def test_bad_bodies_are_refused_by_name(options, match):
     with pytest.raises(am.InvalidInput, match=match):

@@ -155,9 +155,10 @@ class RigidBodies(KeepsLocks):
                                    (key,))  # fmt: skip
             if getattr(self, key) > 0 and len(self.joints):
                 raise InvalidInput("expected 0 with joints: they have no moments", (key,))
-        now = self.gravity_at(0.0)
-        if not callable(self.gravity):
-            object.__setattr__(self, "gravity", read_only(now))
+        if callable(self.gravity):
+            self.gravity_at(0.0)
+        else:
+            object.__setattr__(self, "gravity", read_only(_acceleration(self.gravity)))
         for k, joint in enumerate(self.joints):
             self._check_joint(joint, ("joints", k))
         for k, pair in enumerate(self.apart):
@@ -187,12 +188,9 @@ class RigidBodies(KeepsLocks):
 
     def gravity_at(self, time: float) -> Array:
         """The acceleration (3,) at a time; raises InvalidInput for what is none."""
-        given = self.gravity(time) if callable(self.gravity) else self.gravity
-        found = finite("gravity", given, 1)
-        if found.shape != (3,):
-            when = f" at t = {time:g}" if callable(self.gravity) else ""
-            raise InvalidInput(f"expected 3 numbers{when}, got {shown(given)}", ("gravity",))
-        return found
+        if not callable(self.gravity):
+            return np.asarray(self.gravity)
+        return _acceleration(self.gravity(time), f" at t = {time:g}")
 
     @cached_property
     def packed(self) -> Packed:
@@ -231,6 +229,14 @@ class Packed(NamedTuple):
     lines: Index  # (l + 1,) edges of each direction
     planes: Array  # (p, 4) normal and offset
     apart: NDArray[np.bool_]  # (n, n) pairs that do not meet; (0, 0) where there are none
+
+
+def _acceleration(given: object, when: str = "") -> Array:
+    """(3,); raises InvalidInput for what is none."""
+    found = finite("gravity", given, 1)
+    if found.shape != (3,):
+        raise InvalidInput(f"expected 3 numbers{when}, got {shown(given)}", ("gravity",))
+    return found
 
 
 def _packed(system: RigidBodies) -> Packed:

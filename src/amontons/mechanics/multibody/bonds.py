@@ -16,7 +16,15 @@ from ...solvers.newton.block_lu import factorise_inplace, solve_inplace
 from ...solvers.sweeps.on_bodies import driven_inplace, felt_inplace
 from .apart import dot
 from .free_rotation import turned_freely, twice_energy
-from .rows import fill_blocks, rotations, row_impulses, row_velocities
+from .rows import (
+    fill_blocks,
+    global_inverse,
+    rotations,
+    row_impulses,
+    row_velocities,
+    to_global,
+    to_own,
+)
 
 SMALL = 1e-10  # e over the mean of the diagonal of W_JJ: digits that a null direction costs
 ROUNDS = 4  # of refinement at most
@@ -98,41 +106,36 @@ def factorised(rows, pattern, masses, inverse):
 
 @njit(cache=True, error_model="numpy")
 def solved_bonds(pattern, factor, b):
-    """W_JJ^+ b (k, 3)."""
+    """W_JJ^+ b (k, 3), also of b that joints contradict, by (W + e)^-1 W (W + e)^-1.
+
+    (W + e)^-1 alone would give 1 / e of that part in each round.
+    """
     indptr, indices, symbolic, _ = pattern
     order, upper_start, upper, lower_start, lower = symbolic
     data, U, L, pivots = factor
     x, part, rest = np.zeros_like(b), np.empty_like(b), b.copy()
-    size = np.abs(b).max()
+    felt, size = np.empty_like(b), np.abs(b).max()
     for _ in range(ROUNDS):
         solve_inplace(order, upper_start, upper, lower_start, lower, U, L, pivots, rest, part)
+        _felt_inplace(indptr, indices, data, part, felt)
+        solve_inplace(order, upper_start, upper, lower_start, lower, U, L, pivots, felt, part)
         x += part
-        largest = 0.0
-        for i in range(len(b)):
-            for a in range(3):
-                rest[i, a] = b[i, a]
-                for k in range(indptr[i], indptr[i + 1]):
-                    for d in range(3):
-                        rest[i, a] -= data[k, a, d] * x[indices[k], d]
-                largest = max(largest, abs(rest[i, a]))
-        if not largest > REFINED * size:
+        _felt_inplace(indptr, indices, data, x, felt)
+        rest[:] = b - felt
+        if not np.abs(rest).max() > REFINED * size:
             break
     return x
 
 
 @njit(cache=True, error_model="numpy")
-def global_inverse(R, inverse):
-    """R J^-1 R^T (n, 3, 3) of bodies turned by R."""
-    out = np.zeros_like(R)
-    for b in range(len(R)):
-        for i in range(3):
-            for m in range(3):
-                turned = 0.0
-                for k in range(3):
-                    turned += R[b, i, k] * inverse[b, k, m]
-                for j in range(3):
-                    out[b, i, j] += turned * R[b, j, m]
-    return out
+def _felt_inplace(indptr, indices, data, x, out):
+    """out = W x, (k, 3)."""
+    for i in range(len(x)):
+        for a in range(3):
+            out[i, a] = 0.0
+            for k in range(indptr[i], indptr[i + 1]):
+                for d in range(3):
+                    out[i, a] += data[k, a, d] * x[indices[k], d]
 
 
 @njit(cache=True, error_model="numpy")
@@ -144,7 +147,7 @@ def kept_to(rows, pattern, factor, bodies, inverse, R, v, spin):  # noqa: PLR091
     """
     slave, master, axes, arms, others = rows
     masses, inertia, _ = bodies
-    omega = _to_global(R, spin)
+    omega = to_global(R, spin)
     before = row_velocities(slave, master, axes, arms, others, v, omega)
     r = -solved_bonds(pattern, factor, before)
     after, turning = _pushed(rows, r, masses, inverse, v, omega)
@@ -153,7 +156,7 @@ def kept_to(rows, pattern, factor, bodies, inverse, R, v, spin):  # noqa: PLR091
     for j in range(len(r)):
         for i in range(3):
             work += 0.5 * r[j, i] * (before[j, i] + left[j, i])
-    spun = _to_own(R, turning)
+    spun = to_own(R, turning)
     for b in range(len(masses)):
         for i in range(3):
             gained += 0.5 * masses[b] * (after[b, i] ** 2 - v[b, i] ** 2)
@@ -173,7 +176,7 @@ def closed_by(rows, pattern, anchors, bodies, begin, middle, v, h, gravity):  # 
     slave, master, axes, arms, others = rows
     x, Q, R, spun = middle
     linked, k = pattern[3], len(slave)
-    omega, free = _to_global(R, spun), v + h * gravity
+    omega, free = to_global(R, spun), v + h * gravity
     inverse = global_inverse(R, bodies[2])
     r, failed = np.zeros((k, 3)), np.zeros(k, np.bool_)
     first, chord = r, rows
@@ -225,7 +228,7 @@ def _closing_inplace(  # noqa: PLR0913
     left, least, ended = np.empty((k, 3)), np.zeros(k), R
     for step in range(CLOSINGS):
         after, turning = _pushed(rows, r, bodies[0], inverse, free, omega)
-        turned, _ = turned_freely(bodies[1], bodies[2], Q, _to_own(R, turning), 0.5 * h)
+        turned, _ = turned_freely(bodies[1], bodies[2], Q, to_own(R, turning), 0.5 * h)
         ended = rotations(turned)
         _, apart = joint_rows(slave, master, anchors, x + 0.5 * h * after, ended)
         size[:] = 0.0
@@ -296,23 +299,6 @@ def _pushed(rows, r, masses, inverse, v, omega):  # noqa: PLR0913
             for k in range(3):
                 turning[b, i] += inverse[b, i, k] * turn[b, k]
     return after, turning
-
-
-@njit(cache=True, error_model="numpy")
-def _to_global(R, own):
-    """R own, (n, 3)."""
-    out = np.zeros_like(own)
-    for b in range(len(own)):
-        for i in range(3):
-            for k in range(3):
-                out[b, i] += R[b, i, k] * own[b, k]
-    return out
-
-
-@njit(cache=True, error_model="numpy")
-def _to_own(R, vectors):
-    """R^T vectors, (n, 3)."""
-    return _to_global(R.transpose(0, 2, 1), vectors)
 
 
 @njit(cache=True, error_model="numpy")

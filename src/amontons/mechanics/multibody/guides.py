@@ -11,13 +11,13 @@ is an answer, which the judge confirms without a sweep; else sweeps go on from t
 
 from __future__ import annotations
 
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from .quick import Posed
-from .rows import Rows, delassus
+from .rows import Mobility, Rows, delassus
 from .sweeping import FEWEST, WORK, Search, found_quickly
 
 Array = NDArray[np.float64]
@@ -26,44 +26,49 @@ EARLY = 1e-6  # error of that
 SAME = 1e-9  # 1 - cosine of two normals that are one; cosine of two that are perpendicular
 
 
-def between_planes(rows: Rows, contacts: int, normals: Array, bodies: int) -> bool:
-    """True where a body touches two planes that face each other; normals (p, 3) of all.
+class Guides(NamedTuple):
+    """Planes of which some face each other: normals (p, 3) of all, and which do (p, p).
 
     They do where their normals are more than a right angle apart: a wedge faces itself.
     """
-    opposed = normals @ normals.T < -SAME
-    if not opposed.any():
-        return False
-    on = np.flatnonzero(rows.master[:contacts] < 0)
-    contact, plane = np.nonzero(rows.axes[on, 0] @ normals.T > 1.0 - SAME)
-    touches = np.zeros((bodies, len(normals)))
-    touches[rows.slave[on[contact]], plane] = 1.0
-    return bool((touches @ opposed * touches).any())
+
+    normals: Array
+    opposed: NDArray[np.bool_]
+
+    @classmethod
+    def of(cls, normals: Array) -> Guides | None:
+        """None where no two of the planes face each other."""
+        opposed = normals @ normals.T < -SAME
+        return cls(normals, opposed) if opposed.any() else None
+
+    def hold(self, rows: Rows, contacts: int, bodies: int) -> bool:
+        """True where a body touches two planes that face each other."""
+        on = np.flatnonzero(rows.master[:contacts] < 0)
+        contact, plane = np.nonzero(rows.axes[on, 0] @ self.normals.T > 1.0 - SAME)
+        touches = np.zeros((bodies, len(self.normals)))
+        touches[rows.slave[on[contact]], plane] = 1.0
+        return bool((touches @ self.opposed * touches).any())
 
 
 def least_squeezed(
-    rows: Rows, R: Array, bodies: tuple[Array, Array, Array], posed: Posed, contacts: int,
-    mu: float, tolerance: float,
+    rows: Rows, mobility: Mobility, posed: Posed, contacts: int, mu: float,
+    tolerance: float,
 ) -> Posed:  # fmt: skip
-    """The same problem, started from contacts alone that press if all give way.
-
-    R (b, 3, 3); bodies: masses (b,) with inertia and its inverse in own axes.
-    """
+    """The same problem, started from contacts alone that press if all give way."""
     data = posed.data.copy()
     own = data[posed.diagonal]
     gives = SOFT * np.trace(own, axis1=1, axis2=2)
     data[posed.diagonal] = own + gives[:, None, None] * np.eye(3)
-    soft = Search(posed._replace(data=data), rows, R, bodies, contacts, mu, EARLY)
+    soft = Search(posed._replace(data=data), rows, mobility, contacts, mu, EARLY)
     found = soft.sweep(soft.r, max(FEWEST, WORK // max(len(posed.indices), 1)), 0)
     r = soft.latest if found is None else found.r
     presses = r[:, 0] > 0.0
     presses[contacts:] = True
     some: list[Any] = [part[presses] for part in rows]
-    masses, _, inverse = bodies
-    W = delassus(Rows(*some), masses, R @ inverse @ R.swapaxes(1, 2))
+    W = delassus(Rows(*some), *mobility)
     few = Posed(*W, posed.q[presses], r[presses])
     count = int(presses[:contacts].sum())
-    search = Search(few, Rows(*some), R, bodies, count, mu, tolerance)
+    search = Search(few, Rows(*some), mobility, count, mu, tolerance)
     start = np.zeros_like(r)
     start[presses] = found_quickly(search)[1]
     return posed._replace(start=start)

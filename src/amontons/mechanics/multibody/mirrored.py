@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from .joints import Joints
 from .met import Met
 from .quick import Posed
-from .rows import Rows, velocities
+from .rows import Rows, to_global, velocities
 from .states import Motion
 
 Array = NDArray[np.float64]
@@ -44,7 +44,7 @@ def mirror_inplace(  # noqa: PLR0913
     """
     nc, q = len(at.keys), posed.q
     those: list[Any] = [part[nc:] for part in at.rows]
-    u_m = velocities(Rows(*those), v, np.einsum("bij,bj->bi", middle[2], middle[3]))
+    u_m = velocities(Rows(*those), v, to_global(middle[2], middle[3]))
     q[nc:] += u_m - c
     if not nc:  # beside contacts it would leave none of the load to them
         posed.start[:] = pull

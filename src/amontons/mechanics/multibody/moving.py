@@ -65,14 +65,24 @@ from ...solvers.contract import Iterate, Solver
 from ...solvers.driver import drive_as_asked
 from .bodies import RigidBodies
 from .ends import ended, middle_of
-from .guides import between_planes, least_squeezed
+from .guides import Guides, least_squeezed
 from .joints import Joints
 from .meeting import meetings
 from .met import Met
 from .mirrored import closed, mirror_inplace
 from .quick import Found, Posed, law_of, matched, pose
 from .rolling import couples, rolling_problem
-from .rows import Rows, delassus, impulses, rotations, rows_at, turned
+from .rows import (
+    Mobility,
+    Rows,
+    delassus,
+    global_inverse,
+    impulses,
+    rotations,
+    rows_at,
+    to_global,
+    to_own,
+)
 from .states import (
     Motion,
     RigidEnergies,
@@ -154,7 +164,7 @@ def at_start(system: RigidBodies) -> RigidState:
         np.array([getattr(body, name) for body in system.bodies])
         for name in ("position", "orientation", "velocity", "spin")
     )
-    own = np.einsum("bij,bi->bj", rotations(orientation), spin)
+    own = to_own(rotations(orientation), spin)
     none = np.zeros((0, 3))
     return RigidState(
         0, 0.0, Motion(position, orientation, velocity, own), none.astype(np.int64), none
@@ -181,7 +191,7 @@ class _Stepping:
         self.bodies = masses, inertia, self.inverse
         self.no_couples = np.zeros((len(masses), 3))
         self.near = TOUCHING * system.packed.reach
-        self.normals: Array = system.packed.planes[:, :3]
+        self.guides = Guides.of(system.packed.planes[:, :3])
         self.joints = Joints(system, self.bodies) if len(system.joints) else None
         self.told = False  # that friction is undetermined
 
@@ -199,7 +209,7 @@ class _Stepping:
         mended = self._mended(at, middle[2], f"step {state.index + 1}", deadline)
         if mended is not None:
             moved, gaps = mended
-            before = self._shifted(before, moved, rotations(before.orientation))
+            before = before.shifted(*moved)
             middle = middle_of(*before, self.bodies, h)
             reach = self.system.packed.reach
             angle = np.linalg.norm(moved[1], axis=1)
@@ -209,6 +219,7 @@ class _Stepping:
             else:
                 at = self._closed(at, gaps)
         R, spun, nc = middle[2], middle[3], len(at.keys)
+        mobility = masses, global_inverse(R, self.inverse)
         free = before.velocity + h * gravity, spun
         solved, r, moments, turn, worked = None, np.zeros((0, 3)), NOTHING, self.no_couples, 0.0
         if len(at.rows.slave):
@@ -216,21 +227,23 @@ class _Stepping:
             if self.joints is not None:
                 at, pull, closing = closed(self.joints, at, before, middle, h, gravity)
             posed = Posed(*pose(
-                at.rows, nc, (masses, self.inverse, R), (before.velocity, spun), free,
+                at.rows, nc, (*mobility, R), (before.velocity, spun), free,
                 self.system.restitution, at.keys, (state.keys, state.impulses),
             ))  # fmt: skip
             if self.joints is not None:
                 mirror_inplace(at, middle, before.velocity, pull, closing, posed)
             what = f"step {state.index + 1}"
             if self.system.has_moments:
-                posed = self._unsqueezed(at.rows, R, posed, nc, deadline)
-                solved = self._rolled(at, R, posed, spun, state, what, deadline)
+                posed = self._unsqueezed(at.rows, mobility, posed, nc, deadline)
+                omega = to_global(R, spun)
+                solved = self._rolled(at, mobility, posed, omega, state, what, deadline)
                 r, moments = solved.r[:, :3].copy(), solved.r[:, 3:].copy()
                 turn = couples(at.rows, moments, len(masses))
             else:
-                solved = self._solve(at.rows, R, posed, nc, what, deadline)
+                solved = self._solve(at.rows, mobility, posed, nc, what, deadline)
                 r = solved.r if isinstance(solved, Found) else solved.r.copy()
-                worked = 0.5 * float(np.sum(r[nc:] * closing))
+                if self.joints is not None:
+                    worked = 0.5 * float(np.sum(r[nc:] * closing))
         motion, energies = ended(
             at.rows, r, turn, middle, self.bodies, gravity, h, begin, tuple(before)
         )
@@ -238,10 +251,12 @@ class _Stepping:
         done = RigidEnergies(
             kinetic, potential, gain + lost, contact - worked, mending, taken + worked
         )
-        fallen = 0.5 * float(masses.sum() * (h * gravity) @ (h * gravity))
         end = Motion(*motion)
-        busy = self.joints.energy(end) if self.joints is not None else kinetic
-        loss = state.loss_after(done.joints, busy, fallen, self.asked.tolerance)
+        loss = state.lost, state.most, state.fastest
+        if self.joints is not None:
+            fallen = 0.5 * float(masses.sum() * (h * gravity) @ (h * gravity))
+            busy = self.joints.energy(end)
+            loss = state.loss_after(done.joints, busy, fallen, self.asked.tolerance)
         new = RigidState(state.index + 1, time, end, at.keys, r[:nc], moments, *loss, end)
         said = self._said_of(state, new) + self._undetermined(at)
         return RigidStep(self.system, new, at.found, at.rows.axes[:nc], r[:nc], r[nc:] + jolt,
@@ -257,7 +272,7 @@ class _Stepping:
 
     def _undetermined(self, at: Met) -> tuple[ResultWarning, ...]:
         """Said once of the first contact whose normal joints decide."""
-        if self.told or at.loose.all():
+        if self.told or at.hung is None or at.loose.all():
             return ()
         self.told = True
         which = int(np.argmin(at.loose))
@@ -293,40 +308,41 @@ class _Stepping:
 
     # ------------------------------------------------------------------ problems
     def _solve(
-        self, rows: Rows, R: Array, posed: Posed, contacts: int, what: str, deadline: Deadline
-    ) -> Found | FrictionSolution:
+        self, rows: Rows, mobility: Mobility, posed: Posed, nc: int, what: str,
+        deadline: Deadline,
+    ) -> Found | FrictionSolution:  # fmt: skip
         """The impulses of a step, `what` for messages.
 
         By sweeps alone where no solver is asked for, and no time is counted or over.
         """
         mu = self.system.mu
-        posed = self._unsqueezed(rows, R, posed, contacts, deadline)
+        posed = self._unsqueezed(rows, mobility, posed, nc, deadline)
         if self.solver is None and not _timed(deadline):
-            search = Search(posed, rows, R, self.bodies, contacts, mu, self.asked.tolerance)
+            search = Search(posed, rows, mobility, nc, mu, self.asked.tolerance)
             found, start = found_quickly(search)
             if found is not None:
                 return found
             posed = posed._replace(start=start)
-        law = law_of(contacts, len(posed.q) - contacts, mu)
+        law = law_of(nc, len(posed.q) - nc, mu)
         return self._driven(posed.problem(law), posed.start, what, deadline)
 
     def _unsqueezed(
-        self, rows: Rows, R: Array, posed: Posed, contacts: int, deadline: Deadline
+        self, rows: Rows, mobility: Mobility, posed: Posed, nc: int, deadline: Deadline
     ) -> Posed:
         """Started without squeeze between planes; as it is where work is counted or over."""
         mu = self.system.mu
         if mu == 0 or _timed(deadline):
             return posed
-        if not between_planes(rows, contacts, self.normals, len(R)):
+        if self.guides is None or not self.guides.hold(rows, nc, len(mobility[0])):
             return posed
-        return least_squeezed(rows, R, self.bodies, posed, contacts, mu, self.asked.tolerance)
+        return least_squeezed(rows, mobility, posed, nc, mu, self.asked.tolerance)
 
     def _rolled(  # noqa: PLR0913
-        self, at: Met, R: Array, posed: Posed, spin: Array, state: RigidState, what: str,
-        deadline: Deadline,
+        self, at: Met, mobility: Mobility, posed: Posed, omega: Array, state: RigidState,
+        what: str, deadline: Deadline,
     ) -> FrictionSolution:  # fmt: skip
         """Impulses and moments, (nc, 6), where contacts resist rolling or spinning."""
-        problem = rolling_problem(self.system, at.rows, R, self.bodies, posed.q, spin)
+        problem = rolling_problem(self.system, at.rows, mobility, posed, omega)
         moments = np.zeros((len(at.keys), 3))
         if len(state.moments):
             matched(at.keys, state.keys, state.moments, moments)
@@ -365,11 +381,11 @@ class _Stepping:
         q = np.zeros((len(rows.slave), 3))
         q[:nc, 0] = at.found.gaps + 0.5 * self.overlap
         q[nc:] = at.apart
-        inverse = R @ self.inverse @ R.swapaxes(1, 2)
+        inverse = global_inverse(R, self.inverse)
         posed = Posed(*delassus(rows, masses, inverse), q, np.zeros_like(q))
         found = None
         if self.solver is None:
-            search = Search(posed, rows, R, self.bodies, nc, 0.0, self.asked.tolerance)
+            search = Search(posed, rows, (masses, inverse), nc, 0.0, self.asked.tolerance)
             found, start = found_quickly(search)
             posed = posed._replace(start=start)
         if found is None:
@@ -380,11 +396,3 @@ class _Stepping:
         moved = push / masses[:, None], np.einsum("bij,bj->bi", inverse, turn)
         gaps[loose] = found.u[:nc, 0] - 0.5 * self.overlap
         return moved, gaps
-
-    def _shifted(self, motion: Motion, by: tuple[Array, Array], R: Array) -> Motion:
-        """The bodies moved and turned, with the velocities that they have in own axes."""
-        moved, angle = by
-        own = np.einsum("bij,bi->bj", R, angle)
-        return motion._replace(
-            position=motion.position + moved, orientation=turned(motion.orientation, own)
-        )

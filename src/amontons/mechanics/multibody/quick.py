@@ -33,7 +33,7 @@ from ...problem.solution import Convergence, FrictionSolution, Outcome, Step
 from ...solvers.sweeps.kernels import EXACT, FIRST_JUDGED, Sweep, sweeps_inplace
 from ...solvers.sweeps.local_contact import CLOSE
 from ...solvers.sweeps.on_bodies import momentum_on_bodies_inplace
-from .rows import coupled, fill_blocks, row_velocities
+from .rows import coupled, fill_blocks, row_velocities, to_global
 
 Array = NDArray[np.float64]
 Index = NDArray[np.int64]
@@ -107,16 +107,13 @@ def pose(rows, contacts, bodies, motion, free, restitution, keys, state):  # noq
     """The problem of a step, as the arrays of `Posed`.
 
     rows: see `Rows`; contacts: how many are no joints.  bodies: masses (b,), inverse inertia
-    and R (b, 3, 3); motion: v before the step and W_f, free: v and W_f without reactions, W in
-    own axes.  keys (contacts, 3); state: keys and impulses of the last step.
+    in global axes and R (b, 3, 3); motion: v before the step and W_f, free: v and W_f without
+    reactions, W in own axes.  keys (contacts, 3); state: keys and impulses of the last step.
     """
     slave, master, axes, arms, master_arms = rows
-    masses, own_inverse, R = bodies
+    masses, inverse, R = bodies
     n, count = len(slave), len(masses)
-    inverse, omega = np.empty((count, 3, 3)), np.empty((count, 3))
-    for b in range(count):
-        _turned_inertia(R[b], own_inverse[b], inverse[b])
-        _turned_vector(R[b], free[1][b], omega[b])
+    omega = to_global(R, free[1])
     q = row_velocities(slave, master, axes, arms, master_arms, free[0], omega)
     if restitution > 0.0 and contacts > 0:
         before = row_velocities(slave, master, axes, arms, master_arms, motion[0], omega)
@@ -131,24 +128,6 @@ def pose(rows, contacts, bodies, motion, free, restitution, keys, state):  # noq
     start = np.zeros((n, 3))
     matched(keys, state[0], state[1], start)
     return indptr, indices, data, diagonal, q, start
-
-
-@njit(cache=True, error_model="numpy")
-def _turned_inertia(R, own, out):
-    """R own R^T."""
-    for i in range(3):
-        for j in range(3):
-            total = 0.0
-            for k in range(3):
-                for m in range(3):
-                    total += R[i, k] * own[k, m] * R[j, m]
-            out[i, j] = total
-
-
-@njit(cache=True, error_model="numpy")
-def _turned_vector(R, own, out):
-    for i in range(3):
-        out[i] = R[i, 0] * own[0] + R[i, 1] * own[1] + R[i, 2] * own[2]
 
 
 @njit(cache=True, error_model="numpy")

@@ -11,11 +11,12 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy import sparse
 
+from ...core.compiled import njit
 from ...problem.law.rolling import RollingFriction
 from ...problem.rolling import RollingProblem
-from .rows import Rows, levers_of
+from .quick import Posed
+from .rows import Mobility, Rows, levers_of
 
 if TYPE_CHECKING:
     from .bodies import RigidBodies
@@ -24,41 +25,45 @@ Array = NDArray[np.float64]
 Index = NDArray[np.int64]
 
 
-def lever_matrix(levers: Array, sides: Index, bodies: int) -> Any:
-    """Sparse G (k n, 6 bodies) of levers (n, 2, k, 6) on the bodies sides (n, 2), < 0 none."""
-    n, _, k, _ = levers.shape
-    contact, side = np.nonzero(sides >= 0)
-    shape = len(contact), k, 6
-    row = np.broadcast_to((k * contact[:, None] + np.arange(k))[:, :, None], shape)
-    column = 6 * sides[contact, side][:, None] + np.arange(6)
-    column = np.broadcast_to(column[:, None, :], shape)
-    values = levers[contact, side].ravel()
-    size = k * n, 6 * bodies
-    return sparse.coo_array((values, (row.ravel(), column.ravel())), size).tocsr()
+@njit(cache=True, error_model="numpy")
+def _blocks_of(slave, master, levers, indptr, indices):
+    """G G^T (nb, 6, 6) of levers (n, 2, 6, 6), in rows of blocks."""
+    data = np.zeros((len(indices), 6, 6))
+    for i in range(len(slave)):
+        for place in range(indptr[i], indptr[i + 1]):
+            j = indices[place]
+            for p in range(2):
+                b = slave[i] if p == 0 else master[i]
+                for s in range(2):
+                    if b < 0 or b != (slave[j] if s == 0 else master[j]):
+                        continue
+                    for a in range(6):
+                        for c in range(6):
+                            for k in range(6):
+                                data[place, a, c] += levers[i, p, a, k] * levers[j, s, c, k]
+    return data
 
 
 def rolling_problem(
-    system: RigidBodies, rows: Rows, R: Array, bodies: tuple[Array, Array, Array], q: Array,
-    spin: Array,
+    system: RigidBodies, rows: Rows, mobility: Mobility, posed: Posed, omega: Array,
 ) -> RollingProblem:  # fmt: skip
-    """Of contacts with free velocities q (nc, 3); spin (b, 3): the free one in own axes."""
-    masses, _, own = bodies
-    inverse = R @ own @ R.swapaxes(1, 2)
-    nc, count = len(q), len(masses)
+    """Of contacts posed without moments; omega (b, 3): free, in global axes."""
+    masses, inverse = mobility
+    nc = len(posed.q)
     levers = np.zeros((nc, 2, 6, 6))
     levers[:, :, :3] = levers_of(*rows, masses, inverse)
     C = np.linalg.cholesky(inverse)
-    omega = np.einsum("bij,bj->bi", R, spin)
     turning = np.zeros((nc, 3))
     for side, (body, sign) in enumerate(((rows.slave, 1.0), (rows.master, -1.0))):
         has = body >= 0
         axes = rows.axes[has]
         levers[has, side, 3:, 3:] = sign * axes @ C[body[has]]
         turning[has] += sign * np.einsum("cij,cj->ci", axes, omega[body[has]])
-    G = lever_matrix(levers, np.stack([rows.slave, rows.master], axis=1), count)
+    pattern = posed.indptr, posed.indices
     lengths = system.mu, system.rolling, system.torsion
     law = RollingFriction(*(np.full(nc, value) for value in lengths))
-    return RollingProblem(G @ G.T, np.hstack([q, turning]), law)
+    blocks = *pattern, _blocks_of(rows.slave, rows.master, levers, *pattern)
+    return RollingProblem._from_blocks(blocks, np.hstack([posed.q, turning]), law)
 
 
 def couples(rows: Rows, moments: Array, bodies: int) -> Array:

@@ -21,6 +21,7 @@ from .apart import cross
 
 Array = NDArray[np.float64]
 Index = NDArray[np.int64]
+Mobility = tuple[Array, Array]  # masses (b,), inverse inertia (b, 3, 3) in global axes
 
 
 class Rows(NamedTuple):
@@ -285,6 +286,38 @@ def rotations(orientation):
         out[b, 2, 1] = 2 * (y * z + w * x)
         out[b, 2, 2] = 1 - 2 * (x * x + y * y)
     return out
+
+
+@njit(cache=True, error_model="numpy")
+def global_inverse(R, inverse):
+    """R J^-1 R^T (n, 3, 3) of bodies turned by R."""
+    out = np.zeros_like(R)
+    for b in range(len(R)):
+        for i in range(3):
+            for m in range(3):
+                turned = 0.0
+                for k in range(3):
+                    turned += R[b, i, k] * inverse[b, k, m]
+                for j in range(3):
+                    out[b, i, j] += turned * R[b, j, m]
+    return out
+
+
+@njit(cache=True, error_model="numpy")
+def to_global(R, own):
+    """R own, (n, 3): vectors in own axes, in global ones."""
+    out = np.zeros_like(own)
+    for b in range(len(own)):
+        for i in range(3):
+            for k in range(3):
+                out[b, i] += R[b, i, k] * own[b, k]
+    return out
+
+
+@njit(cache=True, error_model="numpy")
+def to_own(R, vectors):
+    """R^T vectors, (n, 3), the other way."""
+    return to_global(R.transpose(0, 2, 1), vectors)
 
 
 @njit(cache=True, error_model="numpy")

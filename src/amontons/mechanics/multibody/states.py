@@ -15,7 +15,7 @@ from ...problem.solution import FrictionSolution
 from .bodies import RigidBodies
 from .meeting import Meetings
 from .quick import Found
-from .rows import rotations
+from .rows import rotations, to_own, turned
 
 Array = NDArray[np.float64]
 Index = NDArray[np.int64]
@@ -32,6 +32,13 @@ class Motion(NamedTuple):
     orientation: Array
     velocity: Array
     spin: Array
+
+    def shifted(self, by: Array, angle: Array) -> Motion:
+        """Moved and turned, (n, 3) in global axes, with the velocities in own axes."""
+        own = to_own(rotations(self.orientation), angle)
+        return self._replace(
+            position=self.position + by, orientation=turned(self.orientation, own)
+        )
 
 
 @dataclass(frozen=True, eq=False)

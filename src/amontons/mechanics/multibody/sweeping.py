@@ -27,7 +27,7 @@ from ...solvers.judging import BLUR
 from ...solvers.newton.body_relaxation import BodyMatrix, body_matrix, relaxed
 from ...solvers.sweeps.on_bodies import driven_inplace, felt_inplace
 from .quick import Found, Posed, eliminated_of, solved
-from .rows import Rows, levers_of
+from .rows import Mobility, Rows, levers_of
 
 Array = NDArray[np.float64]
 WORK = 100_000  # blocks of W that plain sweeps multiply at most
@@ -48,14 +48,12 @@ NO_LEVERS, NO_SIDES = np.zeros((0, 2, 3, 6)), np.zeros((0, 2), np.int64)
 class Search:
     """The impulses of one problem of a step, and the best that was found so far.
 
-    rows, rotations R (b, 3, 3) and bodies, masses (b,) with inertia and its inverse (b, 3, 3)
-    in own axes: what W is made of.
+    rows and mobility: what W is made of.
     """
 
     posed: Posed
     rows: Rows
-    R: Array
-    bodies: tuple[Array, Array, Array]
+    mobility: Mobility
     contacts: int
     mu: float
     tolerance: float
@@ -74,8 +72,7 @@ class Search:
     @cached_property
     def levers(self) -> Array:
         """(n, 2, 3, 6), see `levers_of`."""
-        masses, _, inverse = self.bodies
-        return levers_of(*self.rows, masses, self.R @ inverse @ self.R.swapaxes(1, 2))
+        return levers_of(*self.rows, *self.mobility)
 
     @cached_property
     def sides(self) -> NDArray[np.int64]:
@@ -85,7 +82,7 @@ class Search:
     @cached_property
     def matrix(self) -> BodyMatrix:
         """Pattern of the relaxation's."""
-        return body_matrix(self.sides, len(self.bodies[0]))
+        return body_matrix(self.sides, len(self.mobility[0]))
 
     @cached_property
     def law(self) -> tuple[Any, Array, Array]:
@@ -107,7 +104,7 @@ class Search:
         """Sweeps from impulses (n, 3); what they solve, else None with the error noted."""
         given: tuple[Any, ...] = NO_LEVERS, NO_SIDES, 0
         if momentum:
-            given = self.levers, self.sides, len(self.bodies[0])
+            given = self.levers, self.sides, len(self.mobility[0])
         r, (u, status, sliding), done, judged, worst, contact = solved(
             *self.posed._replace(start=start), self.contacts, self.mu, self.tolerance,
             BLUR * self.tolerance, plain, momentum, *given,
@@ -149,7 +146,7 @@ class Search:
 
     def relax(self) -> Array:
         """Impulses of the relaxation with the sliding of those that were swept last."""
-        moved, u = np.empty((len(self.bodies[0]), 6)), np.empty_like(self.latest)
+        moved, u = np.empty((len(self.mobility[0]), 6)), np.empty_like(self.latest)
         driven_inplace(self.levers, self.sides, self.latest, moved)
         felt_inplace(self.levers, self.sides, moved, u)
         u += self.posed.q
