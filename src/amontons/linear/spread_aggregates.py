@@ -1,0 +1,399 @@
+"""The first coarse level of a spread matrix: aggregates of own nodes, and P' A P without A P.
+
+As in `aggregation`, P = (I - omega D^-1 A) T, with T the near-null motions cut up by aggregate;
+here no aggregate has nodes of two processes, and a block of P is that of a node and of all w
+motions of an aggregate, (3, w).  The product is made row by row: of A P there is never more
+than one row, where other ways need as much memory as for A.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy import sparse
+
+from ..core.compiled import njit
+from .aggregation import MISSED, OMEGA, STEPS, strong_graph
+from .borders import Borders, Rows, rows_of_ghosts, starts_of
+from .spread_rows import SpreadRows
+
+Array = NDArray[np.float64]
+Index = NDArray[np.integer]
+SLAB = 20_000  # nodes whose couplings of aggregates are found at a time
+LONE = 1e-12  # of the largest: a coarse unknown with less on the diagonal is none
+
+
+@dataclass(frozen=True, eq=False)
+class SpreadTransfer:
+    """P of own nodes and of ghosts.
+
+    pointers, units (local numbers of aggregates, those of ghosts behind own ones) and blocks
+    (k, 3, w) of the rows of all local nodes; numbers (u,): of units in those of all;
+    borders: of the units that own rows have; modes (own units w, w): near-null motions below.
+    """
+
+    rows: SpreadRows
+    pointers: Index
+    units: Index
+    blocks: Array
+    own: int
+    numbers: Index
+    starts: Index
+    borders: Borders
+    modes: Array
+
+    @property
+    def width(self) -> int:
+        """Motions of an aggregate."""
+        return int(self.blocks.shape[2])
+
+    @property
+    def seen(self) -> int:
+        """Units that own rows have: own ones and some of others."""
+        return (self.borders.own + self.borders.count) // self.width
+
+    def restrict(self, fine: Array) -> Array:
+        """P' of values at own nodes (own, 3), at own units (own units w,)."""
+        out = np.zeros((self.seen, self.width))
+        _restrict(self.rows.own, self.pointers, self.units, self.blocks, fine, out)
+        self.borders.give(out)
+        return out[: self.own].reshape(-1)
+
+    def add(self, coarse: Array, fine: Array) -> None:
+        """fine (own, 3) += P of values at own units (own units w,)."""
+        x = np.zeros((self.seen, self.width))
+        x[: self.own] = coarse.reshape(-1, self.width)
+        self.borders.fetch(x)
+        _add(self.rows.own, self.pointers, self.units, self.blocks, x, fine)
+
+    def destroy(self) -> None:
+        """Give the memory back; all processes have to."""
+        self.borders.destroy()
+
+
+def transfer_to_aggregates(rows: SpreadRows, modes: Array) -> SpreadTransfer | None:
+    """P of a matrix as it is now; modes (own d, w): near-null motions.  None without any."""
+    from pyamg.aggregation import fit_candidates, standard_aggregation
+
+    comm, width = rows.comm, modes.shape[1]
+    joined, _ = standard_aggregation(_couplings_inside(rows))
+    padded = np.zeros((rows.own, 3, width))
+    padded[:, : rows.d] = modes.reshape(rows.own, rows.d, width)
+    unit = np.full(rows.own, -1)
+    unit[np.diff(joined.indptr) > 0] = joined.indices
+    count = int(joined.shape[1]) if joined.nnz else 0
+    starts = starts_of(comm, count)
+    if not starts[-1]:
+        return None
+    T, coarse = np.zeros((rows.own, 3, width)), np.zeros((0, width))
+    if count:
+        pieces, coarse = fit_candidates(joined, padded.reshape(-1, width))
+        T[unit >= 0] = sparse.bsr_array(pieces).tobsr((3, width)).data
+    whose = np.full(rows.local, -1.0)
+    whose[: rows.own] = np.where(unit >= 0, unit + starts[comm.rank], -1)
+    T = np.concatenate([T, np.zeros((len(rows.ghosts), 3, width))])
+    for values in (whose, T):
+        around = Borders(comm, rows.own, rows.ghosts, values[0].size)
+        around.fetch(values)
+        around.destroy()
+    omega = OMEGA / (MISSED * largest(rows))
+    mine = _smoothed(rows, T, whose.astype(np.int64), omega)
+    return _transfer(rows, mine, starts, np.asarray(coarse))
+
+
+def _couplings_inside(rows: SpreadRows) -> sparse.csr_array:
+    """The graph of own nodes, without couplings that are weak, or zero as of held ones."""
+    t = rows.tiles
+    squares = np.einsum("kij,kij->k", t.data, t.data)
+    row = np.repeat(np.arange(rows.own, dtype=np.int32), np.diff(t.indptr))
+    some = (t.indices < rows.own) & (t.indices != row) & (squares > 0)
+    row, column, squares = row[some], t.indices[some], squares[some]
+    most = np.zeros(rows.own)
+    np.maximum.at(most, row, squares)
+    return strong_graph(row, column, squares, most)
+
+
+def _transfer(rows: SpreadRows, mine: Rows, starts: Index, modes: Array) -> SpreadTransfer:
+    """P with the rows of ghosts, its units in local numbers."""
+    comm = rows.comm
+    first, last = starts[comm.rank : comm.rank + 2]
+    theirs = rows_of_ghosts(comm, rows.starts, rows.ghosts, mine)
+
+    def others(units: Index) -> Index:
+        return np.unique(units[(units < first) | (units >= last)])
+
+    seen = others(mine.columns)
+    more = np.setdiff1d(others(theirs.columns), seen)
+    numbers = np.concatenate([np.arange(first, last), seen, more])
+    every = Rows.under_each_other([mine, theirs]) if len(rows.ghosts) else mine
+    width = every.blocks.shape[2]
+    return SpreadTransfer(
+        rows, every.pointers, _local(numbers, every.columns), every.blocks, int(last - first),
+        numbers, starts, Borders(comm, int(last - first), seen, width), modes,
+    )  # fmt: skip
+
+
+def _local(numbers: Index, columns: Index) -> NDArray[np.int32]:
+    """Places of columns in numbers, which need not be ascending."""
+    order = np.argsort(numbers)
+    return order[np.searchsorted(numbers[order], columns)].astype(np.int32)
+
+
+def largest(rows: SpreadRows) -> float:
+    """The size of D^-1 A, D the diagonal blocks, by power iterations."""
+    comm, d = rows.comm, rows.d
+    x = np.cos(np.arange(float(d * rows.own)) + d * rows.starts[comm.rank])
+    inverse, size, rho = rows.tiles.inverse[:, :d, :d], 0.0, 1.0
+    size = np.sqrt(comm.allreduce(float(x @ x)))
+    for _ in range(STEPS):
+        y = rows.times(x / size).reshape(-1, d)
+        x = np.einsum("kij,kj->ki", inverse, y).ravel()
+        size = np.sqrt(comm.allreduce(float(x @ x)))
+        if not 0 < size < np.inf:
+            return 1.0
+        rho = size
+    return float(rho)
+
+
+def _smoothed(rows: SpreadRows, T: Array, whose: Index, omega: float) -> Rows:
+    """Own rows of (I - omega D^-1 A) T, T with a block (3, w) of unit `whose` a node, or -1."""
+    t = rows.tiles
+    known, unit = np.unique(whose, return_inverse=True)
+    unit = unit.astype(np.int64) - (known[0] < 0)
+    pointers = _units_of_rows(t.indptr, t.indices, unit, len(known))
+    units = np.empty(pointers[-1], dtype=np.int32)
+    blocks = np.zeros((pointers[-1], 3, T.shape[2]))
+    _smooth(t.indptr, t.indices, t.data, t.inverse, T, unit, omega, len(known), pointers,
+            units, blocks)  # fmt: skip
+    return Rows(pointers, known[known >= 0][units], blocks)
+
+
+class CoarseProduct:
+    """P' A P for block rows of own nodes (k,) in one pattern, whatever their entries are.
+
+    indptr, indices: of these rows of A, columns local nodes.
+    """
+
+    def __init__(self, P: SpreadTransfer, nodes: Index, indptr: Index, indices: Index) -> None:
+        self.P, self.nodes, self.indptr, self.indices = P, nodes, indptr, indices
+        mine = _pattern(P, nodes, indptr, indices)
+        entries = mine.tocoo()
+        theirs = _sent(P, Rows(mine.indptr, P.numbers[mine.indices], np.zeros(mine.nnz)))
+        self.known = np.unique(np.concatenate([P.numbers, *(rows.columns for _, rows in theirs)]))
+        self.column = np.searchsorted(self.known, P.numbers).astype(np.int32)
+        where = [(entries.coords[0], self.column[entries.coords[1]])]
+        where += [(self._rows(*part), self._columns(part[1])) for part in theirs]
+        row, column = (np.concatenate(part) for part in zip(*where, strict=True))
+        ones = np.ones(len(row), dtype=np.float32)
+        shape = len(P.numbers), len(self.known)
+        self.pattern = sparse.coo_array((ones, (row, column)), shape=shape).tocsr()
+        self.pattern.sort_indices()
+
+    def _rows(self, numbers: Index, rows: Rows) -> Index:
+        return np.repeat(numbers - self.P.starts[self.P.rows.comm.rank], np.diff(rows.pointers))
+
+    def _columns(self, rows: Rows) -> Index:
+        return np.searchsorted(self.known, rows.columns)
+
+    def of(self, data: Array) -> sparse.bsr_array:
+        """Own rows (own units w, n), columns in the numbers of all units; data (nnz, 3, 3)."""
+        P, pattern = self.P, self.pattern
+        pointers, width = pattern.indptr, P.width
+        values = np.zeros((pattern.nnz, width, width))
+        _triple(self.nodes, self.indptr, self.indices, data, P.pointers, P.units, P.blocks,
+                self.column[P.units], len(self.known), pointers, pattern.indices,
+                values)  # fmt: skip
+        columns = self.known[pattern.indices]
+        for numbers, rows in _sent(P, Rows(pointers, columns, values)):
+            _add_blocks(self._rows(numbers, rows), self._columns(rows), rows.blocks, pointers,
+                        pattern.indices, values)  # fmt: skip
+        end = pointers[P.own]
+        shape = width * P.own, width * int(P.starts[-1])
+        own = values[:end], columns[:end], pointers[: P.own + 1]
+        return sparse.bsr_array(own, shape=shape)
+
+
+def _pattern(
+    P: SpreadTransfer, nodes: Index, indptr: Index, indices: Index
+) -> sparse.csr_array:
+    """Which units some rows of A couple, (units, units), local numbers."""
+    count = len(P.numbers)
+    ones = np.ones(len(P.units), dtype=np.float32)
+    motions = sparse.csr_array((ones, P.units, P.pointers), shape=(P.rows.local, count))
+    out = sparse.csr_array((count, count), dtype=np.float32)
+    for begin in range(0, len(nodes), SLAB):
+        pointers = indptr[begin : begin + SLAB + 1]
+        columns = indices[pointers[0] : pointers[-1]]
+        some = np.ones(len(columns), dtype=np.float32), columns, pointers - pointers[0]
+        near = sparse.csr_array(some, shape=(len(pointers) - 1, P.rows.local))
+        rows = motions[nodes[begin : begin + SLAB]]
+        out = sparse.csr_array(out + rows.T @ (near @ motions))
+        out.data[:] = 1.0  # no sum of such can be lost
+    return out
+
+
+def _sent(P: SpreadTransfer, rows: Rows) -> list[tuple[Index, Rows]]:
+    """What others have for own units, their numbers and rows, of rows of all local units."""
+    comm = P.rows.comm
+    owner = np.searchsorted(P.starts, P.numbers, side="right") - 1
+    owner[: P.own] = -1
+    units = [np.flatnonzero(owner == rank) for rank in range(comm.size)]
+    parts = comm.alltoall([(P.numbers[some], rows.of(some)) for some in units])
+    return [part for part in parts if len(part[0])]
+
+
+def let_lone_rest(comm: Any, rows: sparse.bsr_array, first: int) -> None:
+    """Motions that an aggregate of few nodes lacks get a diagonal; their rows are zero.
+
+    rows: of a coarse matrix, whose first own unit has this number.
+    """
+    number = np.repeat(np.arange(len(rows.indptr) - 1), np.diff(rows.indptr))
+    diagonal = np.flatnonzero(number == rows.indices - first)
+    own = np.einsum("kii->ki", rows.data[diagonal])
+    most = max(comm.allgather(float(own.max(initial=0.0)))) or 1.0
+    lacking = np.where(own <= LONE * most, most, 0.0)
+    rows.data[diagonal] += np.eye(rows.data.shape[1]) * lacking[:, None, :]
+
+
+@njit(cache=True, error_model="numpy")
+def _units_of_rows(indptr, indices, unit, units):
+    """Pointers: how many units the nodes of a row belong to."""
+    n = len(indptr) - 1
+    mark = np.full(units, -1, np.int64)
+    out = np.zeros(n + 1, np.int64)
+    for i in range(n):
+        count = 0
+        for k in range(indptr[i], indptr[i + 1]):
+            u = unit[indices[k]]
+            if u >= 0 and mark[u] != i:
+                mark[u] = i
+                count += 1
+        out[i + 1] = out[i] + count
+    return out
+
+
+@njit(cache=True, error_model="numpy")
+def _smooth(indptr, indices, data, inverse, T, unit, omega, units, pointers, out, blocks):  # noqa: PLR0913
+    """Rows of T - omega D^-1 A T, units in the order in which they come."""
+    width = T.shape[2]
+    slot = np.full(units, -1, np.int64)
+    for i in range(len(indptr) - 1):
+        first = used = pointers[i]
+        for k in range(indptr[i], indptr[i + 1]):
+            j = indices[k]
+            u = unit[j]
+            if u < 0:
+                continue
+            s = slot[u]
+            if s < first or s >= used or out[s] != u:
+                s = used
+                slot[u] = s
+                out[s] = u
+                used += 1
+            for a in range(3):
+                for c in range(3):
+                    factor = data[k, a, c]
+                    for b in range(width):
+                        blocks[s, a, b] += factor * T[j, c, b]
+        for s in range(first, used):
+            for b in range(width):
+                x, y, z = blocks[s, 0, b], blocks[s, 1, b], blocks[s, 2, b]
+                for a in range(3):
+                    blocks[s, a, b] = -omega * (
+                        inverse[i, a, 0] * x + inverse[i, a, 1] * y + inverse[i, a, 2] * z
+                    )
+        if unit[i] >= 0:
+            s = slot[unit[i]]
+            for a in range(3):
+                for b in range(width):
+                    blocks[s, a, b] += T[i, a, b]
+
+
+@njit(cache=True, error_model="numpy")
+def _triple(nodes, indptr, indices, data, p_ptr, p_units, P, column, columns, c_ptr, c_idx, out):  # noqa: PLR0913
+    """out += P' A P of rows of nodes; p_units: rows of out, column: their units as columns."""
+    width = P.shape[2]
+    slot = np.full(columns, -1, np.int64)
+    most = 0
+    for i in range(len(nodes)):
+        count = 0
+        for k in range(indptr[i], indptr[i + 1]):
+            count += p_ptr[indices[k] + 1] - p_ptr[indices[k]]
+        most = max(most, count)
+    row = np.empty((most, 3, width))
+    found = np.empty(most, np.int64)
+    for i in range(len(nodes)):
+        used = 0
+        for k in range(indptr[i], indptr[i + 1]):
+            j = indices[k]
+            for t in range(p_ptr[j], p_ptr[j + 1]):
+                u = column[t]
+                s = slot[u]
+                if s < 0:
+                    s = used
+                    slot[u] = s
+                    found[s] = u
+                    used += 1
+                    row[s] = 0.0
+                for a in range(3):
+                    x, y, z = data[k, a, 0], data[k, a, 1], data[k, a, 2]
+                    for b in range(width):
+                        row[s, a, b] += x * P[t, 0, b] + y * P[t, 1, b] + z * P[t, 2, b]
+        for t in range(p_ptr[nodes[i]], p_ptr[nodes[i] + 1]):
+            first, last = c_ptr[p_units[t]], c_ptr[p_units[t] + 1]
+            for s in range(used):
+                at = _place(c_idx, first, last, found[s])
+                for a in range(width):
+                    x, y, z = P[t, 0, a], P[t, 1, a], P[t, 2, a]
+                    for b in range(width):
+                        out[at, a, b] += x * row[s, 0, b] + y * row[s, 1, b] + z * row[s, 2, b]
+        for s in range(used):
+            slot[found[s]] = -1
+
+
+@njit(cache=True, error_model="numpy", inline="always")
+def _place(ascending, first, last, wanted):
+    """Where `wanted` stands in ascending[first:last]."""
+    while last - first > 1:
+        middle = (first + last) // 2
+        if ascending[middle] <= wanted:
+            first = middle
+        else:
+            last = middle
+    return first
+
+
+@njit(cache=True, error_model="numpy")
+def _add_blocks(row, column, blocks, c_ptr, c_idx, out):  # noqa: PLR0913
+    """Add blocks (k, w, w) at rows and columns (k,)."""
+    for k in range(len(row)):
+        out[_place(c_idx, c_ptr[row[k]], c_ptr[row[k] + 1], column[k])] += blocks[k]
+
+
+@njit(cache=True, error_model="numpy", nogil=True)
+def _restrict(own, pointers, units, blocks, fine, out):  # noqa: PLR0913
+    """out += P' fine."""
+    width = blocks.shape[2]
+    for i in range(own):
+        x, y, z = fine[i, 0], fine[i, 1], fine[i, 2]
+        for t in range(pointers[i], pointers[i + 1]):
+            u = units[t]
+            for b in range(width):
+                out[u, b] += blocks[t, 0, b] * x + blocks[t, 1, b] * y + blocks[t, 2, b] * z
+
+
+@njit(cache=True, error_model="numpy", nogil=True)
+def _add(own, pointers, units, blocks, coarse, fine):  # noqa: PLR0913
+    """fine += P coarse."""
+    width = blocks.shape[2]
+    for i in range(own):
+        for t in range(pointers[i], pointers[i + 1]):
+            u = units[t]
+            for b in range(width):
+                x = coarse[u, b]
+                fine[i, 0] += blocks[t, 0, b] * x
+                fine[i, 1] += blocks[t, 1, b] * x
+                fine[i, 2] += blocks[t, 2, b] * x
