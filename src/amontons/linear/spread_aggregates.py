@@ -128,12 +128,16 @@ def _transfer(rows: SpreadRows, mine: Rows, starts: Index, modes: Array) -> Spre
     seen = others(mine.columns)
     more = np.setdiff1d(others(theirs.columns), seen)
     numbers = np.concatenate([np.arange(first, last), seen, more])
-    every = Rows.under_each_other([mine, theirs]) if len(rows.ghosts) else mine
-    width = every.blocks.shape[2]
+    pointers = np.concatenate([mine.pointers, mine.pointers[-1] + theirs.pointers[1:]])
+    units = _local(numbers, np.concatenate([mine.columns, theirs.columns]))
+    blocks = mine.blocks
+    if len(rows.ghosts):
+        blocks.resize((len(units), *blocks.shape[1:]), refcheck=False)  # without a second copy
+        blocks[mine.pointers[-1] :] = theirs.blocks
+    seen_by_own = Borders(comm, int(last - first), seen, blocks.shape[2])
     return SpreadTransfer(
-        rows, every.pointers, _local(numbers, every.columns), every.blocks, int(last - first),
-        numbers, starts, Borders(comm, int(last - first), seen, width), modes,
-    )  # fmt: skip
+        rows, pointers, units, blocks, int(last - first), numbers, starts, seen_by_own, modes
+    )
 
 
 def _local(numbers: Index, columns: Index) -> NDArray[np.int32]:

@@ -24,6 +24,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import sparse
 
+from ..core.memory import give_back
 from .petsc import PREFIX, petsc
 from .spread_aggregates import (
     CoarseProduct,
@@ -36,7 +37,7 @@ from .spread_rows import SpreadRows
 Array = NDArray[np.float64]
 Index = NDArray[np.integer]
 DENSE = 64  # processes at most that make rows of a product in a dense one
-SLAB = 2_000  # block rows that are handed over at a time
+SLAB = 200_000  # entries that are handed over at a time, some three times in memory
 DIRECT = 1_000  # unknowns of a coarse matrix that every process factors, at most
 GAMG = {
     "pc_gamg_reuse_interpolation": True,
@@ -61,7 +62,10 @@ class SpreadCycle:
         t = rows.tiles
         self.change = CoarseProduct(self.P, changing, ends, t.indices[self.blocks])
         self._data = t.data[self.blocks]
-        self.below = CoarseLevels(self.P, _whole_product(self.P))
+        give_back()
+        A = coarse_matrix(self.P)
+        give_back()
+        self.below = CoarseLevels(A, self.P.modes)
 
     def follow(self, data: Array) -> None:
         """Let coarse levels be those of a matrix with other blocks (k, 3, 3) at `blocks`."""
@@ -91,23 +95,25 @@ class SpreadCycle:
                 part.destroy()
 
 
-def _whole_product(P: SpreadTransfer) -> sparse.bsr_array:
-    """Own rows of P' A P; a function, so that its pattern goes when it ends."""
-    t = P.rows.tiles
-    return CoarseProduct(P, np.arange(P.rows.own), t.indptr, t.indices).of(t.data)
+def coarse_matrix(P: SpreadTransfer) -> Any:
+    """P' A P as a matrix of PETSc."""
+    t, comm = P.rows.tiles, P.rows.comm
+    rows = CoarseProduct(P, np.arange(P.rows.own), t.indptr, t.indices).of(t.data)
+    let_lone_rest(comm, rows, int(P.starts[comm.rank]))
+    return spread_matrix(comm, rows, P.width)
 
 
 class CoarseLevels:
-    """PETSc's solver of a coarse matrix, which follows its changes: GAMG, or factors."""
+    """PETSc's solver of a coarse matrix, which follows its changes: GAMG, or factors.
 
-    def __init__(self, P: SpreadTransfer, rows: sparse.bsr_array) -> None:
-        comm = P.rows.comm
-        let_lone_rest(comm, rows, int(P.starts[comm.rank]))
-        self.comm, self.width = comm, P.width
-        self.A = spread_matrix(comm, rows, P.width)
-        give_modes(self.A, P.modes)
+    modes (own, w): near-null motions, whose number is that of the unknowns of an aggregate.
+    """
+
+    def __init__(self, A: Any, modes: Array) -> None:
+        self.A, self.width, self.comm = A, modes.shape[1], A.getComm().tompi4py()
+        give_modes(A, modes)
         self._x, self._b = self.A.createVecs()
-        self.pc = petsc().PC().create(comm)
+        self.pc = petsc().PC().create(self.comm)
         self.pc.setOperators(self.A)
         self._down: list[Any] = []
         self._coarse: list[Any] = []
@@ -116,7 +122,7 @@ class CoarseLevels:
             self.pc.setUp()
             return
         set_gamg(self.pc)
-        with chosen_products(comm):
+        with chosen_products(self.comm):
             self.pc.setUp()
         self.pc.setReusePreconditioner(True)
         finest = self.pc.getMGLevels() - 1
@@ -134,7 +140,8 @@ class CoarseLevels:
 
     def add(self, rows: sparse.bsr_array) -> None:
         """Add own rows, within the pattern, to the matrix, and what they are to those below."""
-        change, subset = spread_matrix(self.comm, rows, self.width), petsc().Mat.Structure.SUBSET_NONZERO_PATTERN
+        change = spread_matrix(self.comm, rows, self.width)
+        subset = petsc().Mat.Structure.SUBSET_NONZERO_PATTERN
         self.A.axpy(1.0, change, subset)
         self.pc.setOperators(self.A)
         with chosen_products(self.comm, alone="scalable"):
@@ -192,8 +199,9 @@ def spread_matrix(comm: Any, rows: sparse.bsr_array, d: int) -> Any:
     A.setSizes(((own, size), (own, size)), bsize=d)
     A.setType("aij")
     A.setPreallocationNNZ(counts)
-    for first in range(0, own // d, SLAB):
-        ends = rows.indptr[first : first + SLAB + 1]
+    step = max(1, SLAB * (own // d) // max(rows.data.size, 1))
+    for first in range(0, own // d, step):
+        ends = rows.indptr[first : first + step + 1]
         some = slice(ends[0], ends[-1])
         parts = (rows.data[some], rows.indices[some], ends - ends[0])
         slab = sparse.bsr_array(parts, shape=(d * (len(ends) - 1), size)).tocsr()
