@@ -24,7 +24,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import sparse
 
-from ..core.memory import give_back
+from ..core.memory import trim
 from .petsc import PREFIX, petsc
 from .spread_aggregates import (
     CoarseProduct,
@@ -62,9 +62,9 @@ class SpreadCycle:
         t = rows.tiles
         self.change = CoarseProduct(self.P, changing, ends, t.indices[self.blocks])
         self._data = t.data[self.blocks]
-        give_back()
+        trim()
         A = coarse_matrix(self.P)
-        give_back()
+        trim()
         self.below = CoarseLevels(A, self.P.modes)
 
     def follow(self, data: Array) -> None:
@@ -199,6 +199,7 @@ def spread_matrix(comm: Any, rows: sparse.bsr_array, d: int) -> Any:
     A.setSizes(((own, size), (own, size)), bsize=d)
     A.setType("aij")
     A.setPreallocationNNZ(counts)
+    A.setOption(PETSc.Mat.Option.USE_INODES, False)  # which take longer in blocks of 6
     step = max(1, SLAB * (own // d) // max(rows.data.size, 1))
     for first in range(0, own // d, step):
         ends = rows.indptr[first : first + step + 1]
