@@ -11,6 +11,7 @@ assembles and keeps its part, and together they run a semismooth Newton method
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -66,6 +67,7 @@ def distributed(
         give_back()  # what the first one has needed for the whole mesh
         rows = [together(comm, lambda: _rows(share))]
         problem = _problem(share, rows, comm, linear or Petsc())
+        share = replace(share, modes=share.modes[:0].copy())  # the matrix has them
         give_back()  # blocks of which PETSc has made its matrix
         found = SpreadActiveSet(problem).solve(float(tolerance))
         solution = DistributedSolution.of(share, problem, found, comm)
