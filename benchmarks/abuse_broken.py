@@ -2,8 +2,8 @@
 
 A family is a function from a random generator and an empty folder to what happened: "refused"
 (an AmontonsError, or exit code 2 with words) or "answered".  `python abuse_broken.py FAMILY
-COUNT SEED` runs some of a family in this process and prints a line for each, so that a crash or
-a hang ends that process only, and counts.
+FIRST COUNT SEED` runs some of a family in this process and prints a line for each, so that a
+crash or a hang ends that process only, and counts.
 """
 
 from __future__ import annotations
@@ -21,6 +21,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 
 import numpy as np
+from machine import options
 from scipy import sparse
 
 import amontons as am
@@ -232,7 +233,12 @@ def _abused(family: str, count: int, seed: int) -> Broken:
 
 
 def main() -> None:
-    family, first, count, seed = sys.argv[1], *map(int, sys.argv[2:5])
+    parser = options(__doc__)
+    parser.add_argument("family", choices=FAMILIES)
+    for name in ("first", "count", "seed"):
+        parser.add_argument(name, type=int)
+    asked = parser.parse_args()
+    family, first, count, seed = asked.family, asked.first, asked.count, asked.seed
     resource.setrlimit(resource.RLIMIT_AS, (MEMORY, MEMORY))
     warnings.simplefilter("error")
     for number in range(first, count):

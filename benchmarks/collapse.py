@@ -18,7 +18,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from machine import describe, printed, with_kept
+from machine import asked_cases, describe, printed, with_kept
 
 import amontons as am
 
@@ -79,7 +79,7 @@ def row(name: str) -> str:
 
 def main() -> None:
     """The page."""
-    rows = printed(row, sys.argv[1:] or CASES)
+    rows = printed(row, asked_cases(__doc__, CASES))
     rows = with_kept(rows, CASES, HERE / "results" / "collapse.md")
     where = describe()
     page = f"""# Collapse of blocks in the plane

@@ -9,7 +9,6 @@ stay on the page as they are.
 
 from __future__ import annotations
 
-import sys
 import time
 from collections.abc import Callable
 from functools import partial
@@ -17,7 +16,7 @@ from pathlib import Path
 from typing import Any
 
 from classes import arch, spinning, wall
-from machine import describe, printed, with_kept
+from machine import asked_cases, describe, printed, with_kept
 
 import amontons as am
 from amontons.mechanics.ready.packings import SpherePacking
@@ -100,7 +99,7 @@ def row(name: str) -> str:
 
 def main() -> None:
     """The page."""
-    rows = printed(row, sys.argv[1:] or CASES)
+    rows = printed(row, asked_cases(__doc__, CASES))
     rows = with_kept(rows, CASES, RESULTS / "hyperstatic.md")
     where = describe()
     page = f"""# Where W is singular or missing

@@ -18,7 +18,7 @@ import sys
 import tempfile
 from pathlib import Path
 
-from machine import describe
+from machine import describe, options
 
 HERE = Path(__file__).resolve().parent
 sys.path.insert(0, str(HERE.parent / "tests" / "faults"))
@@ -48,7 +48,9 @@ def row(name, kind, cuts):
 
 
 def main():
-    kills = int(sys.argv[1]) if len(sys.argv) > 1 else 100
+    parser = options(__doc__)
+    parser.add_argument("kills", nargs="?", type=int, default=100, help="SIGKILLs, about")
+    kills = parser.parse_args().kills
     lines = []
     for name, (text, settings, every, part) in CASES.items():
         with tempfile.TemporaryDirectory() as folder, Worker(Path(folder)) as worker:

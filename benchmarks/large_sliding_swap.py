@@ -93,8 +93,10 @@ squares).
 The error is one of the mesh, of both ways: each node stands for a part of the strip of contact
 as long as a facet, and forces scatter as its edge falls between other nodes.  With two to five
 nodes in contact the scatter is as large as the changes by the slave, which have either sign.
-Normals of the slave are those of what faces the master (`contact.current_mortar`): of whole
-facets they tilt the forces at a rim that is pressed in, by an angle that no mesh makes smaller.
+Normals of the slave are those of what faces the master, and where a facet goes on beyond the
+master's end those of the master, as far as it does (`contact.faced_normals`): the chord from
+below a rim that is pressed in to what rises beside it tilts the forces by an angle that no
+mesh makes smaller. With its normals the horizontal forces of the first table had .94 and .84 %.
 """
 PLACES = 5
 STEPS = ("press 1", "press 2", "drag 1", "drag 2", "horizontal 1", "horizontal 2")

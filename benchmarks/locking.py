@@ -80,6 +80,9 @@ def row(problem, law, kind, order):
 
 
 def main():
+    from machine import options  # beside this file where it runs, not where a test takes it
+
+    options(__doc__).parse_args()
     for problem, sizes in SIZES.items():
         for law in LAWS:
             print(f"\n| {problem}, {law} | {' | '.join(map(str, sizes))} |")

@@ -2,6 +2,7 @@
 
 import os
 import platform
+from argparse import ArgumentParser, RawDescriptionHelpFormatter
 from collections.abc import Callable, Iterable
 from importlib.metadata import version
 from pathlib import Path
@@ -19,6 +20,23 @@ def describe() -> dict[str, str]:
     versions = {name: version(name) for name in PACKAGES}
     cores = str(os.cpu_count())
     return {"cpu": cpu, "cores": cores, "python": platform.python_version(), **versions}
+
+
+def options(doc: str | None) -> ArgumentParser:
+    """A parser whose --help prints the words of the module as they stand there."""
+    return ArgumentParser(description=doc, formatter_class=RawDescriptionHelpFormatter)
+
+
+def asked_cases(doc: str | None, cases: Iterable[str]) -> list[str]:
+    """Names of cases on the command line, all where none is given; ends at an unknown one."""
+    known = list(cases)
+    parser = options(doc)
+    parser.add_argument("names", nargs="*", metavar="NAME", help="; ".join(known))
+    names = parser.parse_args().names
+    for name in names:
+        if name not in known:
+            parser.error(f"no case {name!r}; there are: {'; '.join(known)}")
+    return names or known
 
 
 def with_kept(rows: list[str], names: Iterable[str], page: Path) -> list[str]:

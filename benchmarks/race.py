@@ -253,7 +253,7 @@ class Replay:
         """Cost to the goal at the rate of the last chunk, see `rules.Track.soon`."""
         start = [0.0, 0.0, self.first]
         (_, before, higher), (_, cost, error) = [start, *self.rows[: self.at, :3]][-2:]
-        fall = higher / error if self.at > 1 else min(higher / error, rules.TENTH)
+        fall = higher / error if self.at > 1 else (higher / error) ** rules.LATER
         rest = math.log(max(error / goal, 1.0)) * (cost - before)
         return rest / math.log(fall) if fall > 1.0 else math.inf
 

@@ -14,6 +14,7 @@ from collections import Counter
 from pathlib import Path
 
 import numpy as np
+from machine import options
 
 import amontons as am
 from amontons.mechanics.multibody.quick import Found
@@ -131,6 +132,7 @@ def row(make):
 
 def main():
     """Run all cases, write the table."""
+    options(__doc__).parse_args()
     rows = [row(make) for make in (sliding, rocking, dominoes, pile, arch, rocked, wall)]
     text = "\n".join([
         "# Steps of rigid bodies", "",

@@ -13,6 +13,8 @@ import sys
 import time
 from pathlib import Path
 
+from machine import options
+
 import amontons as am
 from amontons.mechanics.elements import stiffness
 from amontons.mechanics.elements.hyperelasticity import HyperelasticBody, NeoHookean
@@ -68,8 +70,13 @@ def row(kind, order, unknowns):
 
 
 def main():
-    unknowns = float(sys.argv[1]) if len(sys.argv) > 1 else 1e5
-    kinds = [(sys.argv[2], int(sys.argv[3]))] if len(sys.argv) > 3 else KINDS
+    parser = options(__doc__)
+    parser.add_argument("unknowns", nargs="?", type=float, default=1e5)
+    parser.add_argument("kind", nargs="?", choices=sorted({kind for kind, _ in KINDS}))
+    parser.add_argument("order", nargs="?", type=int, choices=(1, 2), default=1)
+    asked = parser.parse_args()
+    unknowns = asked.unknowns
+    kinds = [(asked.kind, asked.order)] if asked.kind else KINDS
     print("| cells | unknowns | stiffness, s | MB | tangent: set-up, s | step, s | MB |")
     print("|---|---|---|---|---|---|---|", flush=True)
     for kind, order in kinds:

@@ -172,11 +172,10 @@ def _couplings(A: NodeBlocks, width: int) -> tuple[Index, NDArray[np.integer], A
     squares = np.einsum("kij,kij->k", A.data, A.data)
     if width > 1:
         unit = np.arange(A.nodes) // width
-        whole = sparse.csr_array((squares, A.indices, A.indptr), shape=(A.nodes,) * 2)
-        join = sparse.csr_array((np.ones(A.nodes), (np.arange(A.nodes), unit)))
-        whole = sparse.csr_array(join.T @ whole @ join)
+        at = np.repeat(unit, np.diff(A.indptr)), unit[A.indices]
+        whole = sparse.coo_array((squares, at), shape=graph.shape).tocsr()
         whole.sort_indices()
-        squares = whole.data
+        squares = whole.data  # a product of matrices would leave out what is zero
     row = np.repeat(np.arange(graph.shape[0]), np.diff(graph.indptr))
     own = row == graph.indices
     largest = np.maximum.reduceat(np.where(own, 0.0, squares), graph.indptr[:-1])

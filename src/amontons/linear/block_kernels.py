@@ -12,6 +12,7 @@ from ..core.compiled import njit
 WELL_CONDITIONED = 1e-6  # |det A| / max|A|^3 from which A^-1 loses no digits that matter
 TURNS = 12  # of Jacobi's method at most; three or four do
 ALIKE = 1e-17  # entry beside the diagonal, relative to it, that is none
+WHOLE = 0  # rows of a contact that are whole blocks in ascending order
 NEXT, AFTER = (1, 2, 0), (2, 0, 1)  # of the three axes
 # Share of the blocks of W that are stored from which products take them by full rows, and how
 # many contacts: fewer have nothing to gain, the rows of more leave the cache.
@@ -105,6 +106,34 @@ def _distinct_rows(indptr, indices, first, d):
 
 
 @njit(cache=True, error_model="numpy")
+def _has_whole_blocks(indptr, indices, i):
+    """True where the three alike rows of contact i are whole blocks in ascending order."""
+    begin, end, last, own = indptr[3 * i], indptr[3 * i + 1], -1, False
+    if uint64(end - begin) % uint64(3):
+        return False
+    for k in range(begin, end, 3):
+        first = indices[k]
+        if first <= last or first != 3 * _contact_of(first, 3):
+            return False
+        if indices[k + 1] != first + 1 or indices[k + 2] != first + 2:
+            return False
+        own |= first == 3 * i
+        last = first + 2
+    return own
+
+
+@njit(cache=True, error_model="numpy")
+def _whole_blocks_inplace(indptr, indices, values, i, first, column, data):
+    """Columns and blocks of the rows of such a contact, from place `first` on."""
+    for b in range((indptr[3 * i + 1] - indptr[3 * i]) // 3):
+        column[first + b] = _contact_of(indices[indptr[3 * i] + 3 * b], 3)
+        for a in range(3):
+            k = indptr[3 * i + a] + 3 * b
+            for c in range(3):
+                data[first + b, a, c] = values[k + c]
+
+
+@njit(cache=True, error_model="numpy")
 def blocks_of_rows(indptr, indices, values, d):
     """Block rows of a matrix (nc d, nc d) in compressed rows, in any order, summed if double.
 
@@ -118,6 +147,10 @@ def blocks_of_rows(indptr, indices, values, d):
         count, end = 1, 0
         mark[i] = i
         rows[i] = _distinct_rows(indptr, indices, d * i, d)
+        if d == 3 and rows[i] == 1 and _has_whole_blocks(indptr, indices, i):
+            rows[i] = WHOLE
+            start[i + 1] = start[i] + (indptr[3 * i + 1] - indptr[3 * i]) // 3
+            continue
         for k in range(indptr[d * i], indptr[d * i + rows[i]]):
             if end - d <= indices[k] < end:  # the block of the entry before
                 continue
@@ -133,6 +166,9 @@ def blocks_of_rows(indptr, indices, values, d):
     mark[:] = -1
     for i in range(nc):
         first = start[i]
+        if rows[i] == WHOLE:
+            _whole_blocks_inplace(indptr, indices, values, i, first, column, data)
+            continue
         count, end = 1, 0
         mark[i] = i
         column[first] = i

@@ -52,6 +52,7 @@ INTERRUPTIBLE = 20_000  # unknowns from which a factorisation takes longer than 
 FAILURES = (ArithmeticError, RuntimeError, MemoryError, ValueError, ImportError)  # of packages
 QUICK_ORDER = 30_000  # unknowns up to which nested dissection costs MUMPS more than it saves
 SMALL_PIVOT = 1.5e-8  # of the scaled matrix, the root of rounding as in [LD]
+NOISE = 8 * np.finfo(float).eps  # relative, of the rows of the trial solve
 RESIDUAL_LIMIT = 1e-6  # relative residual of the trial solve above which a factor is refused
 
 
@@ -198,12 +199,15 @@ class DirectFactor:
 def checked(matrix: sparse.csc_array, solve: Solve) -> Solve:
     """`solve`, refined or corrected where it is inexact, after a trial with a known solution.
 
-    A singular matrix shows here, whatever the backend says; so do perturbed pivots, which
-    lose digits of indefinite matrices.
+    A singular matrix shows here, whatever the backend says: it makes much of the noise that b
+    has, which is there by intent, for sums of round numbers leave none.  So do perturbed
+    pivots, which lose digits of indefinite matrices.
     """
-    x = np.cos(np.arange(matrix.shape[0]))
-    b = matrix @ x
-    scale = max((abs(matrix) @ np.abs(x)).max(initial=0.0), np.finfo(float).tiny)
+    count = np.arange(matrix.shape[0], dtype=float)
+    x = np.cos(count)
+    rows = abs(matrix) @ np.abs(x)
+    b = matrix @ x + NOISE * rows * np.cos(count**2)  # without order
+    scale = max(rows.max(initial=0.0), np.finfo(float).tiny)
 
     def residual_of(found: Array) -> float:
         return float(np.abs(matrix @ found - b).max(initial=0.0) / scale)

@@ -177,7 +177,8 @@ def _state(problem: Any, start: Any) -> tuple[Array, Array]:
 def _judged(problem: Any, found: FrictionSolution) -> tuple[float, Any]:
     """The error of the whole, and its weakest contact where it may decide."""
     v = found.v if problem.has_v else None
-    return problem.error(found.r, v), problem.weakest(found.r, v)
+    known = problem.with_law(problem.law.frozen(found.r, found.u))
+    return known.error(found.r, v), known.weakest(found.r, v)
 
 
 def _ended(

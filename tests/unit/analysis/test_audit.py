@@ -120,6 +120,14 @@ def test_a_node_without_load_that_overlaps_is_said(solved):
     assert "carries no load" not in text
 
 
+def test_a_result_of_zeros_whose_nodes_overlap_by_rounding_is_judged(solved):
+    """Nothing presses, nothing is closed: there is no length to compare an overlap with."""
+    seen = am.audit(solved.model, solved).pairs[0].seen[0]
+    idle = replace(seen, pressed=np.zeros(len(seen.side.node), bool), deepest=1e-17)
+    found = questions.penetration((idle,), 0.0, 1.0, 0.0, str, deck=False)
+    assert "carries no load" not in found.text
+
+
 def test_questions_to_pairs_have_words_where_there_are_no_pairs():
     body = am.Body(am.box((2, 1), (2, 1)), am.LinearElastic(1000.0, 0.3))
     model = am.Model([body], [am.Fix("left", 0)], loads=[am.Traction("right", (0.0, -1.0))])

@@ -159,16 +159,6 @@ def test_convert(folder):
     assert read_fclib("slab.hdf5").dimension == 2
 
 
-def test_info(folder):
-    result = run("info", "tower.hdf5")
-    assert result.exit_code == 0
-    assert "rank of W" in result.stdout
-    assert "gauss-seidel" in result.stdout
-    data = json.loads(run("info", "tower.hdf5", "--json", "-").stdout)
-    assert data["contacts"] == 8
-    assert data["rank of W"] == "12 of 24"
-
-
 def test_bench(folder):
     result = run("bench", "tower.hdf5", "random.hdf5", "--methods", "auto,gauss-seidel",
                  "--tolerances", "1e-2,1e-4", "--profile", "p.png", "--json",

@@ -256,3 +256,22 @@ def test_sizes_grow_with_the_surface_only():
     few, many = (len(page_of(am.solve(block(cells=(n, n, n)))).html) for n in (4, 12))
     facets = 12 * (12**2 - 4**2)
     assert (many - few) / facets < 60  # bytes a triangle; 32 cells have 12 288 of them
+
+
+def test_a_zone_is_seen_from_the_other_side():
+    steel = am.LinearElastic(2e5, 0.3)
+    angles = np.linspace(0, 2 * np.pi, 17)
+    roller = am.Body(am.ring([0.5, 1.0], angles, [0, 1]), steel, "roller")
+    base = am.Body(am.box((1, 4, 1), cells=(1, 4, 1), origin=(1.01, -2, 0)), steel, "base")
+    bore = am.Body(am.ring([1.01, 2.0], angles, [0, 1]), steel, "bore")
+    held = [am.Fix("roller.inner", (0, 0, 0))]
+
+    def outward(other, master):
+        contact = am.Contact("roller.outer", master=master, mu=0.2)
+        other_held = am.Fix(f"{other.name}.top", (0, 0, 0))
+        model = am.Model([roller, other], [*held, other_held], [contact])
+        return Skin(model).zones[0].outward
+
+    np.testing.assert_allclose(outward(base, "base.left"), [1, 0, 0], atol=1e-12)
+    around = outward(bore, "bore.inner")
+    assert np.linalg.norm(around) == pytest.approx(1) and abs(around[2]) < 1e-12

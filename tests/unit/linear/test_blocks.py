@@ -113,3 +113,13 @@ def test_inverse_norms_and_what_one_contact_needs(size):
         np.testing.assert_allclose(e[there, 12:16], size * left.reshape(-1, 4)[there],
                                    atol=1e-13 * size * abs(left).max())  # fmt: skip
         np.testing.assert_allclose(e[:, 16], (size * abs(np.diagonal(A, 0, 1, 2)).sum(1)) ** 2)
+
+
+def test_rows_of_whole_blocks_beside_others():
+    """Rows that are whole blocks in order are copied; one lacks an entry, one its diagonal."""
+    there = np.array([[1, 0, 1, 1], [0, 1, 0, 0], [1, 0, 1, 1], [1, 1, 0, 0]])
+    W = np.random.default_rng(4).standard_normal((12, 12)) * np.kron(there, np.ones((3, 3)))
+    W[7, 0] = 0.0
+    found = block_rows(sparse.csr_array(W), 3)
+    np.testing.assert_array_equal(dense(found, 3)[0], W)
+    assert found.indices.tolist() == [0, 2, 3, 1, 0, 2, 3, 0, 1, 3]

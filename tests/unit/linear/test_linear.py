@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 from scipy import sparse
 
+import amontons as am
 from amontons.core.errors import InvalidInput, MissingDependency, SingularOperator
 from amontons.linear import Direct, GeometricMultigrid, direct
 from amontons.linear.direct import Backend
@@ -109,6 +110,22 @@ def test_direct_refuses_a_singular_matrix(backend):
     free[0, 0] = free[79, 79] = 1
     with pytest.raises(SingularOperator, match="matrix"):
         Direct(backend).factor(sparse.csc_array(free))
+
+
+@pytest.mark.parametrize("backend", INSTALLED)
+@pytest.mark.parametrize(("kind", "order", "cells"), [
+    ("tri", 1, 16), ("quad", 1, 16), ("tri", 2, 3), ("tet", 2, 2), ("hex", 1, 2)])  # fmt: skip
+def test_direct_refuses_blocks_that_nothing_holds_upright(backend, kind, order, cells):
+    """Their entries are round numbers: a trial product alone may leave no rounding to see."""
+    dim = 3 if kind in ("tet", "hex") else 2
+    sides = [am.Fix("left", (0.0, *(None,) * (dim - 1)))]
+    sides += [am.Fix("front", (None, 0.0, None))] if dim == 3 else []
+    mesh = am.box((1.0,) * dim, cells, kind)
+    body = am.Body(mesh, am.LinearElastic(1000.0, 0.3), order=order)
+    plane = am.Plane((0.0,) * (dim - 1) + (1.0,))
+    model = am.Model([body], sides, [am.Contact("bottom", mu=0.0, obstacle=plane)])
+    with pytest.raises(SingularOperator, match="matrix"):
+        Direct(backend).factor(model.assemble().M)
 
 
 def test_direct_names_an_empty_column():

@@ -481,7 +481,9 @@ def test_a_number_stands_where_its_face_is_seen():
 def test_info_refuses_what_does_not_fit(part, tmp_path):
     (tmp_path / "a.msh").write_text("$MeshFormat")
     for arguments, words in (
-        (("example:hild", "--picture", "a.png"), "only for mesh and CAD files"),
+        (("example:tower", "--picture", "a.png"), "has no bodies"),
+        (("example:hild", "--size", 1), "only for CAD files"),
+        (("example:hild", "--picture", "a.gif"), "ends in .png"),
         ((tmp_path / "a.msh", "--size", 1), "only for CAD files"),
         ((part, "--picture", "a.gif"), "ends in .png"),
         ((tmp_path / "a.msh", "--no-glue"), "only for CAD files"),

@@ -86,6 +86,25 @@ def test_sides_that_give_way_overlap_by_pressure_over_stiffness(order):
     assert abs(step.energies.defect) < 1e-6 * step.energies.turnover
 
 
+def test_sides_that_give_way_along_a_curve():
+    """Overclosures and pressures lie on it, on other pieces than where pressure begins."""
+    curve = am.OverclosureCurve([0.0, 0.005, 0.02, 1.0], [-0.01, 0.01, 0.03, 0.2])
+    normal, shear, step = dragged(mu=0.1, stiffness=curve)
+    weights = np.repeat(0.25, 5) * [0.5, 1, 1, 1, 0.5]
+    assert (normal > 0.02 * weights).any()
+    np.testing.assert_allclose(-step.gap, curve.needed(normal / weights)[0], rtol=1e-6)
+    assert shear.sum() == pytest.approx(0.1 * normal.sum(), rel=1e-6)
+
+
+def test_friction_over_pressure_of_sides_that_give_way():
+    """A stiffness is no overlap, whatever friction follows."""
+    curve = am.FrictionCurve(lambda p, s: 0.004 / np.maximum(p, 0.005))
+    normal, shear, step = dragged(mu=curve, stiffness=0.5)
+    weights = np.repeat(0.25, 5) * [0.5, 1, 1, 1, 0.5]
+    np.testing.assert_allclose(-step.gap, normal / (0.5 * weights), rtol=1e-6)
+    assert shear.sum() == pytest.approx(0.004, rel=1e-6)
+
+
 LAWS = [{"tresca": 0.01}, {"mu": 0.4, "cap": 0.02}, {"mu": 0.3, "cohesion": 0.01},
         {"mu": 0.3, "stiffness": 2.0},
         {"tresca": 0.01, "cohesion": 0.02, "stiffness": 1.0}]  # fmt: skip

@@ -109,7 +109,7 @@ def test_what_joints_lose_by_long_steps_is_of_third_order_and_told():
     assert lost[0] > 5 * lost[1]  # contacts of the guide are of first order
 
 
-@pytest.mark.parametrize(("turning", "told"), [(300.0, True), (60.0, False)])
+@pytest.mark.parametrize(("turning", "told"), [(1000.0, True), (300.0, False)])
 def test_spin_about_an_axis_of_symmetry_does_not_hide_what_joints_lose(turning, told):
     """A leaning gyroscope on a point: its nod is of far less energy than its spin."""
     R = np.array([[1, 0, 0], [0, np.cos(1.2), -np.sin(1.2)], [0, np.sin(1.2), np.cos(1.2)]])

@@ -47,8 +47,7 @@ def both(system, step, until, tolerance=1e-12):
     """Steps by sweeps and by the solver that is chosen otherwise."""
     asked = {"step": step, "until": until, "tolerance": tolerance}
     return (
-        list(am.evolve_rigid(system, **asked, solver=solver))
-        for solver in (None, am.Auto())
+        list(am.evolve_rigid(system, **asked, solver=solver)) for solver in (None, am.Auto())
     )
 
 

@@ -85,8 +85,8 @@ def test_w_is_h_inverse_mass_h():
     )
 
 
-def test_a_free_body_keeps_its_energy_and_nearly_its_momentum():
-    """About its middle axis, where it turns over: energy to rounding, momentum by h^2."""
+def test_a_free_body_keeps_its_energy_and_its_momentum():
+    """About its middle axis, where it turns over: both to rounding."""
     body = RigidBody(cuboid((1, 2, 3)), spin=(0.01, 3, 0))
     drift = []
     for step in (2e-2, 1e-2):
@@ -98,7 +98,7 @@ def test_a_free_body_keeps_its_energy_and_nearly_its_momentum():
         before = J @ np.array([0.01, 3, 0])
         drift.append(np.linalg.norm(L - before) / np.linalg.norm(before))
         assert min(s.state.motion.spin[0, 1] for s in steps) < -2  # it has turned over
-    assert drift[1] < 0.3 * drift[0] < 0.3 * 0.05
+    assert max(drift) < 1e-12
 
 
 @pytest.mark.parametrize(("mu", "slips"), [(0.4, False), (0.1, True)])

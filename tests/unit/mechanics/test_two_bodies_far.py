@@ -256,3 +256,18 @@ def test_a_side_of_the_slave_does_not_see_the_master_through_its_body():
         (step,) = am.evolve(model, am.QuasiStatic(1.0), until=1.0)
         force.append(spread(step)[1])
     assert np.abs(force[1] - force[0]).max() < 1e-8 * np.abs(force[0]).max()
+
+
+# --------------------------------------------------------------- a slave wider than the master
+def test_a_slave_of_second_order_wider_than_the_master_sticks_in_a_few_steps():
+    """Bulges were extrapolated beyond the master's rim: 46 steps, or no state at all."""
+    below = am.box((1, 1, 0.5), (3, 3, 1), origin=(-0.5, -0.5, -0.5))
+    above = am.box((0.6, 0.6, 0.5), (2, 2, 1), origin=(-0.3, -0.3, 0))
+    bodies = [am.Body(below, NEO, name="below", order=2),
+              am.Body(above, am.NeoHookean(4.0, 0.3), name="above", order=2)]  # fmt: skip
+    pressed = am.Fix("above.top", (0, 0, lambda x, t: -0.05 * t))
+    model = am.Model(bodies, [am.Fix("below.bottom", 0), pressed],
+                     contacts=[pair(("below.top", "above.bottom"), 0.2)])  # fmt: skip
+    steps = list(am.evolve(model, am.QuasiStatic(0.25), until=1.0))
+    assert len(steps) == 4
+    assert max(step.solution.convergence.iterations for step in steps) <= 4

@@ -170,7 +170,7 @@ def ending(what):
     lower, upper = bodies()
     if what == "pressed flat":
         down = am.Fix("upper.top", (0, lambda x, t: -2.2 * t))
-        return model([lower, upper], down), "cell .* of body 'lower' is pressed to det F"
+        return model([lower, upper], down), "cell .* of body 'upper' is pressed to det F"
     if what == "not a number":
         torn = am.Body(upper.mesh, brittle(), name="upper")
         held = [am.Fix("upper.left", (0, -0.02)),
@@ -343,13 +343,18 @@ def test_chords_and_slivers_are_no_overlap_of_bodies():
         assert bool(overlapping(upper, lower)) == told
 
 
-def test_a_master_deep_inside_a_coarse_slave_is_told_and_the_other_way_is_not():
+@pytest.mark.parametrize(("dim", "down"), [(2, 0.2), (2, 0.1), (3, 0.15)])
+def test_a_master_deep_inside_a_coarse_slave_is_told_and_the_other_way_is_not(dim, down):
     """A wedge goes between nodes of the slave, whose averages see little of its edge."""
-    wedge = am.box((0.6, 0.8), (6, 4), origin=(0.2, 0.5))
-    points = wedge.points + np.outer(1.5 * np.abs(wedge.points[:, 0] - 0.5), (0, 1))
-    bodies = [am.Body(am.box((1, 0.5), (3, 2)), am.NeoHookean(1.0, 0.3), name="low"),
+    three = dim == 3
+    wedge = (am.box((0.6, 0.6, 0.8), (6, 2, 4), origin=(0.2, 0.2, 0.5)) if three
+             else am.box((0.6, 0.8), (6, 4), origin=(0.2, 0.5)))  # fmt: skip
+    up = np.eye(dim)[-1]
+    points = wedge.points + np.outer(1.5 * np.abs(wedge.points[:, 0] - 0.5), up)
+    low = am.box((1, 1, 0.5), (3, 3, 2)) if three else am.box((1, 0.5), (3, 2))
+    bodies = [am.Body(low, am.NeoHookean(1.0, 0.3), name="low"),
               am.Body(replace(wedge, points=points), am.NeoHookean(10.0, 0.3), name="up")]
-    supports = [am.Fix("low.bottom", 0), am.Fix("up.top", (0, -0.2))]
+    supports = [am.Fix("low.bottom", 0), am.Fix("up.top", tuple(-down * up))]
     for slave, master, told in (("low.top", "up.bottom", 1), ("up.bottom", "low.top", 0)):
         contact = am.Contact(slave, master=master, mu=0.3)
         solution = am.solve(am.Model(bodies, supports, [contact]))

@@ -197,7 +197,7 @@ def test_a_first_track_that_is_nearly_there_goes_on_alone():
 
 
 def test_a_first_track_that_ends_on_stacks_leaves_no_other_in_its_place(monkeypatch):
-    monkeypatch.setattr(race, "chunks_alone", lambda problem, tolerance: 1)
+    monkeypatch.setattr(race, "chunks_alone", lambda problem: 1)
     monkeypatch.setattr(State, "is_stacked", True)
     spent, done = costs(Entry("first", falling(0.1, 0.01, count=1)),
                         Entry("dear", falling(0.99, 1e3), stacked=50),

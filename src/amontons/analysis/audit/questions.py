@@ -54,7 +54,7 @@ def penetration(seen: tuple[Seen, ...], approach: float, element: float, moved: 
         "largest displacement"
     )  # fmt: skip
     text += f"; gaps where contact presses are {max(shares):.2g} of what contact closes"
-    if not wrong and depth > OVERLAP * approach and _carries_nothing(deepest):
+    if not wrong and depth > OVERLAP * approach > 0 and _carries_nothing(deepest):
         text += (f"; node {hit} carries no load, and overlaps by {depth / approach:.2g} of "
                  "that: only gaps where contact presses count, and area that lies a quarter "
                  f"of it inside, here {inside:.1%}")  # fmt: skip

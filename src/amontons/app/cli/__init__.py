@@ -94,6 +94,7 @@ def solve(**options: object) -> int:
     short_help="Say what a problem is, and which methods fit.", epilog="""\b
 Examples:
   amontons info part.step --picture faces.png      which face has which name
+  amontons info case.toml --picture bodies.png     all bodies, with names of their surfaces
   amontons info case.toml --json - | jq .contacts
 """
 )

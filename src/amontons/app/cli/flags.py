@@ -37,9 +37,9 @@ def axes(command: Command) -> Command:
 
 
 def surfaces(command: Command) -> Command:
-    """Of what describes meshes: a picture of their surfaces."""
+    """Of what has meshes: a picture of their surfaces."""
     picture = click.option("--picture", metavar="FILE",
-                           help="Of a mesh or CAD file: its surfaces with numbers on them."
+                           help="Of a mesh, CAD file, case or deck: surfaces with numbers."
                            )  # fmt: skip
     size = click.option("--size", type=float, metavar="X",
                         help="Of a CAD file: size of cells. [a 15th of its length]"

@@ -21,7 +21,7 @@ from ...problem.nitsche import NitscheProblem
 from ...problem.protocol import Problem
 from ...solvers import METHODS
 from ...solvers.contract import taken_by
-from .info_mesh import is_mesh
+from .info_mesh import FIGURES, assembly, draw, is_mesh
 from .info_mesh import run as run_mesh
 from .sources import open_source
 from .terminal import check_writable, deliver_json, say_notes, show_table
@@ -40,18 +40,20 @@ def run(
     time_limit: float | None = None, picture: str | None = None, size: float | None = None,
     no_glue: bool = False,
 ) -> None:  # fmt: skip
-    """Print the table, or the JSON; of a mesh or CAD file its surfaces."""
+    """Print the table, or the JSON, and draw all bodies; of a mesh or CAD file its surfaces."""
     if is_mesh(source):
         run_mesh(source, size, picture, json_copy, glue=not no_glue)
         return
-    asked = {"--picture": picture is not None, "--size": size is not None, "--no-glue": no_glue}
-    for name, given in asked.items():
+    for name, given in {"--size": size is not None, "--no-glue": no_glue}.items():
         if given:
-            raise InvalidInput(f"{name}: only for mesh and CAD files, whose surfaces it shows")
+            raise InvalidInput(f"{name}: only for CAD files, which are meshed on reading")
     check_writable(json_copy, "--json")
+    check_writable(picture, "--picture", FIGURES)
     if time_limit is not None:
         check_seconds(time_limit)
     opened = open_source(source, overrides)
+    if picture is not None and not opened.has_model:
+        raise InvalidInput(f"--picture: {source} has no bodies whose surfaces it could show")
     problem = opened.solvable()
     facts = {"name": opened.name, **describe(problem)}
     if opened.has_model:
@@ -63,6 +65,8 @@ def run(
     if json_copy != "-":
         show_table(opened.title, ["", ""], [[k, _text(v)] for k, v in facts.items()], "left")
         say_notes(opened.notes)
+    if picture is not None:
+        draw(assembly(opened.model.bodies), picture)
     if json_copy is not None:
         told = {"notes": list(opened.notes)} if opened.notes else {}
         deliver_json(to_json(facts | told), json_copy)

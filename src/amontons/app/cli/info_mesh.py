@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -12,10 +13,13 @@ from ...core.errors import InvalidInput
 from ...io.meshes import read_mesh
 from ...io.readers import MESHES
 from ...io.results import to_json
-from ...mechanics.meshes import Facets, Mesh, is_cad, read_cad
+from ...mechanics.meshes import Cells, Facets, Mesh, is_cad, read_cad
 from ...mechanics.meshes.surfaces import facet_areas
 from .sources import check_is_plain
 from .terminal import check_writable, deliver_json, show_table
+
+if TYPE_CHECKING:
+    from ...mechanics.model import Body
 
 FIGURES = (".png", ".svg", ".pdf")
 CELLS_ALONG = 15  # of a CAD file without --size, along its longest side
@@ -49,12 +53,33 @@ def run(
         print(kinds)
         print(*_bonds(facts, glue and is_cad(source)), sep="\n", end="")
     if picture is not None:
-        from ...io.plots.saving import save_figure
-        from ...io.plots.surface_names import draw_surface_names
-
-        save_figure(draw_surface_names(mesh), picture)
+        draw(mesh, picture)
     if json_copy is not None:
         deliver_json(to_json(facts), json_copy)
+
+
+def draw(mesh: Mesh, picture: str) -> None:
+    """Write the picture of its surfaces with their numbers and names."""
+    from ...io.plots.saving import save_figure
+    from ...io.plots.surface_names import draw_surface_names
+
+    save_figure(draw_surface_names(mesh), picture)
+
+
+def assembly(bodies: Sequence[Body]) -> Mesh:
+    """All bodies in one mesh; of several, surfaces are named after body and surface."""
+    cells: list[Cells] = []
+    surfaces: dict[str, tuple[Facets, ...]] = {}
+    first = 0
+    for body in bodies:
+        mesh = body.mesh
+        cells += [replace(block, nodes=block.nodes + first) for block in mesh.cells]
+        for name, blocks in mesh.surfaces.items():
+            whole = f"{body.name}.{name}" if len(bodies) > 1 else name
+            surfaces[whole] = tuple(replace(f, nodes=f.nodes + first) for f in blocks)
+        first += len(mesh.points)
+    points = np.concatenate([body.mesh.points for body in bodies])
+    return Mesh(points, tuple(cells), surfaces)
 
 
 def describe(mesh: Mesh) -> dict[str, Any]:

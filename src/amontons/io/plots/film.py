@@ -30,7 +30,7 @@ from ..vtk import stresses
 from .bodies import JOINTS, draw_bodies
 from .layout import Sheet
 from .rigid_film import rigid_figures
-from .saving import picture
+from .saving import spent_picture
 from .scene import Frame, Scene, magnification, room_needed
 from .steps import SECONDS, few_colours, film_of, joint_legend, moment
 from .style import UNKNOWN, Units, with_unit
@@ -90,7 +90,7 @@ def film(
         figures = _figures(given, colour, magnify, units)
     else:
         raise InvalidInput(f"steps: expected steps in time, one at least, got {shown(given)}")
-    pictures = [picture(figure) for figure in figures]
+    pictures = [spent_picture(figure) for figure in figures]
     if path.suffix.lower() == ".gif":
         write_bytes(path, film_of([few_colours(drawn, 256) for drawn in pictures], seconds))
     else:

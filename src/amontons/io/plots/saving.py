@@ -18,6 +18,16 @@ def picture(figure: Figure, suffix: str = ".png") -> bytes:
     return drawn.getvalue()
 
 
+def spent_picture(figure: Figure) -> bytes:
+    """The bytes of a PNG of a figure that is emptied then.
+
+    Its artists hold each other: many figures would stay until the collector of garbage comes.
+    """
+    drawn = picture(figure)
+    figure.clear()
+    return drawn
+
+
 def save_figure(figure: Figure, path: str | os.PathLike[str]) -> None:
     """Write a figure, complete or not at all; the suffix names the format."""
     write_bytes(path, picture(figure, Path(path).suffix))

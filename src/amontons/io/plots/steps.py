@@ -21,7 +21,7 @@ from ...mechanics.model import Model
 from ...problem.solution import ContactStatus
 from .bodies import JOINTS, WIDTHS, draw_bodies
 from .layout import Sheet
-from .saving import picture
+from .saving import spent_picture
 from .scene import Frame, Scene, magnification, room_needed
 from .style import UNKNOWN, Units, stamp_panel, with_unit
 
@@ -117,7 +117,7 @@ def draw_film(
         for k, frame in enumerate(frames, start=1):
             figure = step_figure(scene, frame, magnify=factor, room=room, units=units)
             paths.append(folder / f"{name}-{k:05d}.png")
-            drawn = picture(figure)
+            drawn = spent_picture(figure)
             write_bytes(paths[-1], drawn)
             images.append(few_colours(drawn))
         if images:

@@ -11,16 +11,17 @@ from matplotlib.collections import PolyCollection
 from numpy.typing import NDArray
 
 from ...mechanics.meshes.cells import CELLS
-from ...mechanics.meshes.facets import corner_facets
+from ...mechanics.meshes.facets import Facets, corner_facets
 from ...problem.solution import ContactStatus
 from .contact_pairs import ContactPair
 from .style import COLOURS, INK, round_below
+from .surface_views import Projection, Unrolled, view_of
 
 if TYPE_CHECKING:
     from ...mechanics.model import Model
 
 Array = NDArray[np.float64]
-Patches = Iterator[tuple[Array, NDArray[np.int64]]]  # polygons (k, 4, 2) and their nodes
+Patches = Iterator[tuple[Array, NDArray[np.int64]]]  # polygons (k, 4, 3) and their nodes
 QUARTERS = {"quad9": ((0, 4, 8, 7), (4, 1, 5, 8), (8, 5, 2, 6), (7, 8, 6, 3)),
             "quad8": ((0, 4, 1, 5, 2, 6, 3, 7),)}  # fmt: skip
 HEAT = "YlOrRd"
@@ -34,10 +35,10 @@ LONGEST = 0.25  # of the surface, where contacts are few
 def draw_maps(
     left: Axes, right: Axes, pair: ContactPair, model: Model, *, named: bool
 ) -> None:
-    """The surface seen along its mean normal: status left, pressure and shear arrows right."""
-    origin, axes, names = _view(pair.points)
+    """The surface laid flat (`surface_views`): status left, pressure and shear arrows right."""
+    view = view_of(pair.points, pair.frames[:, 0])
     patches: Any
-    patches, owner = _node_patches(model, pair, origin, axes)
+    patches, owner = _node_patches(model, pair, view)
     colours = np.array([COLOURS[status] for status in ContactStatus])[pair.status]
     known = owner >= 0
     face = np.where(known, colours[np.maximum(owner, 0)], "#FFFFFF")
@@ -51,12 +52,12 @@ def draw_maps(
                        edgecolors="face", linewidths=0.2)
     )  # fmt: skip
     _draw_scale(right, largest)
-    tips = _shear_arrows(right, pair, origin, axes)
+    tips = _shear_arrows(right, pair, view)
     place = f" on {pair.name}" if named else ""
     left.set_title(f"Contact status{place}")
     right.set_title("Pressure, shear on the slave (arrows)")
     for panel in (left, right):
-        panel.set(aspect="equal", xlabel=names[0], ylabel=names[1])
+        panel.set(aspect="equal", xlabel=view.names[0], ylabel=view.names[1])
         panel.update_datalim(tips)  # no arrow leaves the frame; both panels show the same
         panel.autoscale_view()
 
@@ -72,30 +73,22 @@ def _draw_scale(axes: Axes, largest: float) -> None:
     scale.yaxis.label.set_fontsize(9)
 
 
-def _view(points: Array) -> tuple[Array, Array, tuple[str, str]]:
-    """Origin and two axes (2, 3) to draw on: global ones if the surface is flat along them."""
-    spread = np.ptp(points, axis=0)
-    flat = int(np.argmin(spread))
-    if spread[flat] <= 0.5 * np.sort(spread)[1]:
-        kept = [k for k in range(3) if k != flat]
-        return np.zeros(3), np.eye(3)[kept], ("xyz"[kept[0]], "xyz"[kept[1]])
-    origin = points.mean(axis=0)
-    axes = np.linalg.svd(points - origin, full_matrices=False)[2][:2]
-    return origin, axes, ("first principal direction", "second principal direction")
-
-
 def _node_patches(
-    model: Model, pair: ContactPair, origin: Array, axes: Array
+    model: Model, pair: ContactPair, view: Projection | Unrolled
 ) -> tuple[Array, NDArray[np.int64]]:
-    """Facets cut into one patch per node, and the contact at that node or -1."""
+    """Facets with contacts cut into a patch for each node, and the contact there or -1.
+
+    Facets without any are left out: the far side of a body would hide the contacts.
+    """
     patches, owner = [], []
-    points = (model.bodies[pair.body].mesh.points - origin) @ axes.T
+    points = model.bodies[pair.body].mesh.points
     contact = np.full(len(points), -1)
     contact[pair.node] = np.arange(len(pair.node))
     for facets in pair.facets:
         middles = facets.nodes[:, CELLS[facets.kind].corner_count :]
         if (contact[middles] < 0).all():  # averages sit at corners
             facets = corner_facets(facets)  # noqa: PLW2901
+        facets = Facets(facets.kind, facets.nodes[(contact[facets.nodes] >= 0).any(axis=1)])
         cut = _thirds if facets.kind == "tri6" else _quarters
         tables = QUARTERS.get(facets.kind, [slice(None)])
         if facets.kind == "quad8" and (contact[facets.nodes[:, 4:]] < 0).all():
@@ -104,7 +97,7 @@ def _node_patches(
             for patch, nodes in cut(points, facets.nodes[:, table]):
                 patches.append(patch)
                 owner.append(contact[nodes])
-    return np.concatenate(patches), np.concatenate(owner)
+    return view.laid(np.concatenate(patches)), np.concatenate(owner)
 
 
 def _quarters(points: Array, nodes: NDArray[np.int64]) -> Patches:
@@ -126,13 +119,14 @@ def _thirds(points: Array, nodes: NDArray[np.int64]) -> Patches:
         yield np.stack(patch, axis=1), nodes[:, 3 + k]
 
 
-def _shear_arrows(axes: Axes, pair: ContactPair, origin: Array, view: Array) -> Array:
+def _shear_arrows(axes: Axes, pair: ContactPair, view: Projection | Unrolled) -> Array:
     """Shear tractions in global axes, at most MAX_ARROWS of them; returns their tips (k, 2)."""
-    shear = np.einsum("ik,ikc->ic", pair.shear, pair.frames[:, 1:]) @ view.T
+    shear = np.einsum("ik,ikc->ic", pair.shear, pair.frames[:, 1:])
+    shear = view.turned(pair.points, shear)
     if not shear.any():
         return np.empty((0, 2))
     stride = -(-len(shear) // MAX_ARROWS)
-    at, shear = ((pair.points - origin) @ view.T)[::stride], shear[::stride]
+    at, shear = view.laid(pair.points[::stride, None])[:, 0], shear[::stride]
     size = np.maximum(np.ptp(at, axis=0), 1e-12)
     longest = min(ARROW_LENGTH * np.sqrt(np.prod(size) / len(at)), LONGEST * size.max())
     length = np.linalg.norm(shear, axis=1)

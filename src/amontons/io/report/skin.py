@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.spatial import cKDTree
 
 from ...linear.blocks import spatial
 from ...mechanics.contact.geometry import Plane
@@ -24,6 +25,8 @@ Array = NDArray[np.float64]
 Index = NDArray[np.int64]
 SHARP = 0.87  # cosine between facets below which their common edge is drawn as one of the body
 WIDER = 0.15  # of the size of the slave, by which a plane is drawn beyond it
+NEAR = 2.0  # lengths of a facet beyond the least gap within which it faces the other side
+AROUND = 0.1  # of their area, that is left of normals which turn around
 PIECES = {  # facets as lines or triangles of their nodes
     "line": [[0, 1]], "line3": [[0, 2], [2, 1]], "tri": [[0, 1, 2]],
     "tri6": [[0, 3, 5], [3, 1, 4], [5, 4, 2], [3, 4, 5]], "quad": [[0, 1, 2], [0, 2, 3]],
@@ -40,8 +43,8 @@ RINGS = {"line": [0, 1], "line3": [0, 2, 1], "tri": [0, 1, 2], "tri6": [0, 3, 1,
 class Zone:
     """A contact pair: pieces of both sides, (k, d) vertices; a rigid side is points and pieces.
 
-    outward (3,): mean normal of the slave, out of its body.  slave, master: names, as a user
-    reads them.
+    outward (3,): mean normal, out of its body, of what of the slave lies nearest to the other
+    side.  slave, master: names, as a user reads them.
     """
 
     slave: str
@@ -124,8 +127,7 @@ class Skin:
         k, surface = locate(self.model.bodies, contact.slave)
         mesh = self.model.bodies[k].mesh
         facets = mesh.surface(surface)
-        normals = _unit(np.concatenate([facet_normals(mesh.points, f) for f in facets]))
-        outward = spatial(normals).mean(axis=0)
+        outward = self._outward(mesh.points, facets, contact)
         pieces = vertex[k][_pieces(facets)]
         nothing = np.zeros((0, self.model.dimension), dtype=np.int64)
         title = f"{surface} of {self.model.bodies[k].name}"
@@ -141,6 +143,27 @@ class Skin:
         points, rigid = self._rigid(contact, pieces)
         return Zone(title, "rigid obstacle", pieces, nothing, outward, points,
                     rigid)  # fmt: skip
+
+    def _outward(self, points: Array, facets: tuple[Facets, ...], contact: Contact) -> Array:
+        """The mean normal of facets at the least gap or up to two of their lengths farther."""
+        middles = np.concatenate([points[f.nodes].mean(axis=1) for f in facets])
+        normals = np.concatenate([facet_normals(points, f) for f in facets])
+        if contact.master is not None:
+            other = [locate(self.model.bodies, side) for side in contact.masters]
+            meshes = [self.model.bodies[k].mesh for k, _ in other]
+            sides = [m.points[f.nodes].mean(axis=1)
+                     for m, (_, name) in zip(meshes, other, strict=True)
+                     for f in m.surface(name)]  # fmt: skip
+            gaps = cKDTree(np.concatenate(sides)).query(middles)[0]
+        else:
+            assert contact.obstacle is not None
+            gaps = contact.obstacle.gap(middles)
+        sizes = np.linalg.norm(normals, axis=1) ** (1 / (points.shape[1] - 1))
+        near = gaps <= gaps.min() + NEAR * sizes
+        facing: Array = normals[near].sum(axis=0)
+        if np.linalg.norm(facing) < AROUND * np.linalg.norm(normals[near], axis=1).sum():
+            facing = normals[gaps.argmin()]  # a pin in its bore: any side of it
+        return _unit(spatial(facing[None]))[0]
 
     def _rigid(self, contact: Contact, pieces: Index) -> tuple[Array, Index]:
         """What is drawn of an obstacle: a plane beyond the slave, else the part in front of it.

@@ -1,11 +1,11 @@
 """Dual mortar contact of two deforming bodies where they are now.
 
 A pair has slave nodes p and a master surface.  All is taken at the positions x of all nodes:
-n_p is the unit normal at p, out of the master into the slave, the area average of the facets
-around it where they face the master, as what rises beyond a rim would tilt forces; of a node
-that faces nobody, in dynamics, of ties and under a given bound (Tresca's law) that of whole
-facets.  On every slave facet psi are the dual functions of `dual` on that part of it that
-faces the master ([PSG]), D_p = int psi_p over all facets, and
+n_p is the unit normal at p, out of the master into the slave, that of `faced_normals`: the
+area average of the facets around it where they face the master; of a node that faces nobody,
+in dynamics, of ties and under a given bound (Tresca's law) that of whole facets.  On every
+slave facet psi are the dual functions of `dual` on that part of it that faces the master
+([PSG]), D_p = int psi_p over all facets, and
 
     B_pp = 1,   B_pq = - int psi_p N_q / D_p  of master nodes q,   sum_j B_pj = 0,         (1)
     G_p = sum_j B_pj x_j,      g_p = n_p . G_p,                                             (2)
@@ -37,10 +37,11 @@ Facets of second order have multipliers at their corners, psi dual to the functi
 order there; integrals are those over the facets through the corners ([PW]).  Bulges at the
 other nodes m, from the mean of corners c with parts w_mc, enter B as
 
-    B_pm = int psi_p N_m / D_p,    B_pc -> B_pc - w_mc B_pm,    of the master with -N_m.    (4)
+    B_pm = int chi_p N_m / D_p,    B_pc -> B_pc - w_mc B_pm,    of the master with -N_m,    (4)
 
-The force lambda_p then acts at p and at these; what a body needs of it at the corner is
-sum_j C_pj (f_int - f)_j, C_pp = 1 and C_pm = w_mp, as moving p without a bulge takes m along.
+chi = psi where all of a facet faces the master, see `shared`.  The force lambda_p then acts at
+p and at these; what a body needs of it at the corner is sum_j C_pj (f_int - f)_j, C_pp = 1 and
+C_pm = w_mp, as moving p without a bulge takes m along.
 
 One surface against itself falls into two sides, see `folds`; nodes that are of no slave facet
 alone are open like those that do not meet.
@@ -63,6 +64,7 @@ from scipy import sparse
 from ...linear.sums import sum_of_blocks, sum_of_products
 from .couples import Couples
 from .current_slopes import MortarSlopes
+from .faced_normals import FacedNormals
 from .facing import Skin, shapes
 from .fading import Fading
 from .folds import Fold
@@ -72,7 +74,6 @@ from .shared import Shared
 Array = NDArray[np.float64]
 Index = NDArray[np.int64]
 Mask = NDArray[np.bool_]
-ROUNDING = 1e-12  # of a facet: what does not face the master where all of it does
 ACROSS = 0.5  # m . n_M of (3') below which sides hardly face each other: d is zero
 
 
@@ -154,45 +155,15 @@ class MortarMeeting:
         """E of `surface_axes`, (nc, 2, 3); None for none."""
         return None if self.axes is None else (self.axes @ self.x).reshape(-1, 2, 3)
 
+    @cached_property
+    def facing(self) -> FacedNormals:
+        """What normals come from."""
+        return FacedNormals(self)
+
     @property
-    def faced(self) -> Index:
-        """Numbers in `around` of the facets of `shared`, (f,)."""
-        of = self.shared.facets
-        return of if self.pair.fold is None else self.pair.fold.halves[0][of]
-
-    @cached_property
-    def covered(self) -> Array | None:
-        """Parts of facets `around` that face the master, (f,); None: all count whole."""
-        if self.pair.areas is None:
-            return None
-        whole = np.linalg.norm(self.pair.around[0].areas(self.x), axis=1)
-        out = np.zeros(len(whole))
-        out[self.faced] = self.shared.mass.sum(axis=(1, 2)) / whole[self.faced]
-        return np.where(np.abs(out - 1) < ROUNDING, 1.0, out)
-
-    @cached_property
-    def heeded(self) -> Array:
-        """Parts (f, a) of facets `around` in the normals of their nodes."""
-        (skin, heeded), covered = self.pair.around, self.covered
-        met = np.isin(skin.nodes, [] if covered is None else self.slaves[self.met])
-        parts = np.where(met, 1.0 if covered is None else covered[:, None], 1.0)
-        return np.where(heeded, parts, 0.0)
-
-    @cached_property
-    def sums(self) -> Array:
-        """Area vectors around the slaves, into the slave, in free directions, (nc, d)."""
-        skin, heeded = self.pair.around[0], self.heeded
-        share = -skin.areas(self.x) / skin.corners[:, None]
-        out = np.zeros(self.x.shape)
-        for slot in range(skin.nodes.shape[1]):
-            np.add.at(out, skin.nodes[:, slot], share * heeded[:, slot, None])
-        return out[self.pair.slaves] * self.pair.free
-
-    @cached_property
     def normals(self) -> Array:
         """n, (nc, d); zero where all facets around have shrunk to points."""
-        size = np.linalg.norm(self.sums, axis=1, keepdims=True)
-        return self.sums / np.where(size > 0, size, 1.0)
+        return self.facing.unit
 
     # ---------------------------------------------------------------- averages
     @cached_property
@@ -245,16 +216,17 @@ class MortarMeeting:
             return sparse.csr_array(shape)
         scale = np.where(row >= 0, self.by_weight[row], 0.0)[:, :, None]
         left = scale * (parts.psi @ parts.mass) * ~parts.kept[:, None, :]
-        onto = (scale * parts.psi)[parts.of] @ parts.cross
         a, b = left.shape[1], master.nodes.shape[1]
+        onto = (scale * parts.psi)[parts.of] @ parts.cross[..., :b]
         own = np.ones((nc, 1, 1)), np.arange(nc)[:, None], pair.slaves[:, None]
         beside = left, row, slave.nodes[parts.facets]
-        across = -onto[..., :b], row[parts.of], master.nodes[parts.master]
+        across = -onto, row[parts.of], master.nodes[parts.master]
         out = sum_of_blocks([own, beside, across], shape)
         if not self.has_bulges:
             return out
-        raised = scale * (parts.psi @ parts.own[:, :, a:]), row, slave.middles[parts.facets]
-        facing = -onto[..., b:], row[parts.of], master.middles[parts.master]
+        raised = scale * (parts.chi @ parts.own[:, :, a:]), row, slave.middles[parts.facets]
+        bent = (scale * parts.chi)[parts.of] @ parts.cross[..., b:]
+        facing = -bent, row[parts.of], master.middles[parts.master]
         bent = sum_of_blocks([raised, facing], shape)
         return sum_of_products([(None, out), (bent, self.bulges)], shape)
 

@@ -6,6 +6,8 @@ follows from
 
     d(A h) = dW Q h - A dmass Q h + A dh       for h linear in own and cross.               (1)
 
+With bulges chi = theta A + (1 - theta) P of `shared` is in the place of A.
+
 Derivatives stand in dense blocks, one for a pair of facets, until they are summed up once:
 sparse products of single steps would cost more than all numbers in them.
 Notation is that of `current_mortar`.
@@ -31,6 +33,7 @@ from ...linear.sums import (
     sum_of_blocks,
     sum_of_products,
 )
+from .bulge_slopes import BulgeSlopes
 from .facet_integrals import FacetPairs
 from .facing import dofs_of
 
@@ -86,7 +89,7 @@ class MortarSlopes:
             by_gap = by_motion @ beside[:, :, None]
             by_normal = by_normal + by_gap * self.at.distances[:, None]
             by_distance = by_distance + by_gap * self.at.normals[:, None]
-        entries += [*(part.times(by_normal) for part in self._normals),
+        entries += [*(part.times(by_normal) for part in self.at.facing.slopes),
                     *self.by_distances(by_distance),
                     averaged(earlier.averages, by_motion)]  # fmt: skip
         nc, m = by_normal.shape[:2]
@@ -130,43 +133,9 @@ class MortarSlopes:
         return self.combined(nothing, nothing, self._eyes, earlier)
 
     @cached_property
-    def _normals(self) -> list[SlotSlopes]:
-        """Of n, a part per facet, and one per pair of facets where some of it is met."""
-        (skin, _), n, x = self.at.pair.around, self.at.normals, self.at.x
-        (f, a), (nc, d) = skin.nodes.shape, n.shape
-        length = np.linalg.norm(self.at.sums, axis=1)
-        length = np.where(length > 0, length, 1.0)
-        project = (np.eye(d) - n[:, :, None] * n[:, None, :]) / length[:, None, None]
-        project = -project * self.at.pair.free[:, None, :]
-        own = np.full(len(x), -1)
-        own[self.at.slaves] = np.arange(nc)
-        heeded = self.at.heeded
-        row = np.where(heeded > 0, own[skin.nodes], -1)
-        share = (heeded / skin.corners[:, None])[:, :, None, None]
-        values = np.where((row >= 0)[:, :, None, None], project[row] * share, 0.0)
-        slopes = skin.area_slopes(x).reshape(f, 1, d, a * d)
-        out = [SlotSlopes(values @ slopes, row, dofs_of(skin.nodes, d))]
-        partly = np.asarray((heeded > 0) & (heeded < 1))
-        cut = np.asarray(partly.any(axis=1))
-        some = np.flatnonzero(cut)
-        if not len(some) or self.at.covered is None:
-            return out
-        # parts that are met change with the master: c a = C a / |a|, C the area that is met
-        facing = skin.areas(x)[some]
-        facing /= np.linalg.norm(facing, axis=1)[:, None]
-        along = np.einsum("fd,fdw->fw", facing, slopes[some, 0])
-        across = (values[some] @ facing[:, None, :, None]) * partly[some][..., None, None]
-        out[0].values[some] -= across * along[:, None, None, :]
-        of = self.at.faced[self.at.shared.of]
-        pairs = np.flatnonzero(cut[of])
-        of = of[pairs]
-        by_area, _, dofs = self.integrals
-        number = np.full(f, -1)
-        number[some] = np.arange(len(some))
-        by_area = by_area[pairs][:, :, :a].sum(axis=(1, 2))
-        across /= self.at.covered[some, None, None, None]
-        moved = across[number[of]] * by_area[:, None, None, :]
-        return [*out, SlotSlopes(moved, np.where(partly[of], row[of], -1), dofs[pairs])]
+    def _bulges(self) -> BulgeSlopes:
+        """What theta adds."""
+        return BulgeSlopes(self.at, self.integrals)
 
     @cached_property
     def integrals(self) -> tuple[Array, Array, Index]:
@@ -194,8 +163,10 @@ class MortarSlopes:
     def _distances(self) -> SlotSlopes:
         """Of G by the integrals, a part per pair of facets; B is held."""
         parts, pair, d = self.at.shared, self.at.pair, self.at.x.shape[1]
-        at = pair.slave.values(self.at.x)[parts.facets]
-        there = pair.master.values(self.at.x)[parts.master]
+        at, there = self._bulges.places
+        theta = parts.blend[0][:, None, None]
+        at[:, pair.slave.nodes.shape[1] :] *= theta
+        there[:, pair.master.nodes.shape[1] :] *= theta[parts.of]
         h = parts.own @ at
         np.subtract.at(h, parts.of, parts.cross @ there)
         kept, psi, row = parts.kept, parts.psi, self.at.rows
@@ -213,6 +184,8 @@ class MortarSlopes:
         k, w = dofs.shape
         values = (scaled[parts.of] @ moved.reshape(k, a, d * w)).reshape(k, a, d, w)
         values += apart[parts.of][..., None] * own[:, :, :a].sum(axis=2)[:, :, None]
+        if self.at.has_bulges:
+            values += scale[parts.of][:, :, None, None] * self._bulges.distances()
         return SlotSlopes(values, row[parts.of], dofs)
 
     def pushed(self, force: Array) -> sparse.csr_array:
@@ -247,13 +220,16 @@ class MortarSlopes:
         carries = (parts.kept & (self.at.rows >= 0))[:, :, None]
         w = np.where(carries, scaled[self.at.rows], 0.0)  # (f, p, c)
         z = parts.psi.swapaxes(1, 2) @ w  # (f, r, c)
-        by_x = self._changes(z, w)
+        by_x, theta = self._changes(z, w), parts.blend[0]
         a, b = slave.nodes.shape[1], master.nodes.shape[1]
         left = np.where(~parts.kept & slave.real[parts.facets], slave.nodes[parts.facets], -1)
-        out = self._onto(z, by_x, (left, slice(a)), (master.nodes[parts.master], slice(b)))
+        out = self._onto(z, by_x, (left, slice(a)), (master.nodes[parts.master], slice(b)),
+                         np.ones(len(theta)))  # fmt: skip
         if self.at.has_bulges:
-            bent = self._onto(z, by_x, (slave.middles[parts.facets], slice(a, None)),
-                              (master.middles[parts.master], slice(b, None)))  # fmt: skip
+            sides = ((slave.middles[parts.facets], slice(a, None)),
+                     (master.middles[parts.master], slice(b, None)))  # fmt: skip
+            bent = self._onto(parts.chi.swapaxes(1, 2) @ w, by_x, *sides, theta)
+            bent += self._bulges.spread(w, *sides)
             lifts = by_components(sparse.csr_array(self.at.bulges.T), np.ones(self.at.x.shape))
             n = self.at.x.size
             out.append((lifts, rows_of_products(bent, (n, n))))
@@ -283,11 +259,13 @@ class MortarSlopes:
         return rows_of_products([(None, rest), (by_weights, self.weights)], (f * a * d, n))
 
     def _onto(
-        self, z: Array, by_x: Rows, mine: tuple[Index, slice], theirs: tuple[Index, slice]
-    ) -> list[Product]:
+        self, z: Array, by_x: Rows, mine: tuple[Index, slice], theirs: tuple[Index, slice],
+        theta: Array,
+    ) -> list[Product]:  # fmt: skip
         """Of z own at nodes of the slave's facets (f, s), and -z cross at the master's (k, b).
 
-        by_x: v of (2) by x; with the nodes come their slots in own and cross.
+        by_x: v of (2) by x, of which z hears theta (f,); with the nodes come their slots in own
+        and cross.
         """
         parts = self.at.shared
         f, a, d = z.shape
@@ -297,7 +275,7 @@ class MortarSlopes:
             (mine, parts.own, own, np.arange(f)), (theirs, -parts.cross, -cross, parts.of)
         ):  # fmt: skip
             s = nodes.shape[1]
-            held = parts.inverse[of] @ held[:, :, slots]
+            held = theta[of, None, None] * (parts.inverse[of] @ held[:, :, slots])
             held = held.swapaxes(1, 2)  # Q h, (., s, r)
             at = np.where(nodes[:, :, None] >= 0, nodes[:, :, None] * d + np.arange(d), -1)
             columns = of[:, None, None] * a * d + np.arange(a * d).reshape(a, d)

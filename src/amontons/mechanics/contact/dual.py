@@ -27,8 +27,7 @@ def dual_functions(mass: Array, kept: Mask, real: Mask) -> Array:
     mass (f, a, a): int phi_r phi_s; kept (f, a): nodes with multiplier, at least one on each
     facet; real (f, a): False for the slots that a facet with fewer nodes leaves empty.
     """
-    share = (real & ~kept) / np.maximum(kept.sum(axis=1), 1)[:, None]
-    shared = kept[:, :, None] * share[:, None, :] + np.eye(mass.shape[1]) * kept[:, :, None]
+    shared = sharing_functions(kept, real)
     both = kept[:, :, None] & kept[:, None, :]
     moment = np.where(both, shared @ mass, 0.0)
     size = np.sqrt(np.where(kept, np.einsum("faa->fa", mass), 1.0))
@@ -41,6 +40,12 @@ def dual_functions(mass: Array, kept: Mask, real: Mask) -> Array:
     inverse /= size[:, :, None] * size[:, None, :]
     weight = np.where(kept, mass.sum(axis=1), 0.0)
     return weight[:, :, None] * np.where(both, inverse, 0.0) @ shared
+
+
+def sharing_functions(kept: Mask, real: Mask) -> Array:
+    """phi of the kept, each with its share of the others, in phi, (f, a, a); their sum is 1."""
+    share = (real & ~kept) / np.maximum(kept.sum(axis=1), 1)[:, None]
+    return kept[:, :, None] * share[:, None, :] + np.eye(kept.shape[1]) * kept[:, :, None]
 
 
 def nodes_with_multiplier(

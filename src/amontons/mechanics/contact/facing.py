@@ -177,6 +177,16 @@ class Skin:
         out[:, :, 1] -= by_second
         return out
 
+    def normal_slopes(self, x: Array, chosen: Index) -> Array:
+        """Derivatives of the unit normals of chosen facets (k,) by their nodes, (k, d, a d)."""
+        some = self.part(chosen)
+        areas, d = some.areas(x), x.shape[1]
+        size = np.linalg.norm(areas, axis=1)[:, None]
+        size = np.where(size > 0, size, 1.0)
+        n = areas / size
+        across = (np.eye(d) - n[:, :, None] * n[:, None, :]) / size[:, :, None]
+        return across @ some.area_slopes(x).reshape(len(areas), d, d * some.nodes.shape[1])
+
 
 def dofs_of(nodes: Index, d: int) -> Index:
     """Dofs (k, a d) of nodes (k, a)."""

@@ -112,12 +112,7 @@ class Newcomers:
         (A, h), w = self._held, self._weights
         by, rows = factors[self.row], self.row[:, None] * m + np.arange(m)
         there = dofs_of(facets.nodes, d)
-        areas = facets.areas(self.at.x)
-        size = np.linalg.norm(areas, axis=1)
-        size = np.where(size > 0, size, 1.0)
-        n = areas / size[:, None]
-        across = (np.eye(d) - n[:, :, None] * n[:, None, :]) * (h / size)[:, None, None]
-        turned = across @ facets.area_slopes(self.at.x).reshape(k, d, -1)
+        turned = h[:, None, None] * facets.normal_slopes(self.at.x, np.arange(k))
         moved = (A[:, None, :, None] * np.eye(d)[:, None]).reshape(k, d, -1) + turned
         _, cross, dofs = self.at.slopes.integrals
         corners = facets.nodes.shape[1]

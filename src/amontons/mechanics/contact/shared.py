@@ -1,17 +1,26 @@
 """What facets of two surfaces share: integrals, dual functions, and which nodes carry force.
 
-Notation is that of `current_mortar`.
+Notation is that of `current_mortar`.  On a facet of which a part c faces the master psi of
+nodes far from that part extrapolate from it: what is linear rightly, but bulges are told
+several times too large, in space up to ten times.  Friction then works on other motions than
+it hears, and no state need exist in which nodes stick or slip.  Bulges are averaged by
+
+    chi = theta psi + (1 - theta) phi,    theta = t^2 (3 - 2 t),  t = c^2,                  (1)
+
+phi with the shares of nodes that carry nothing: chi = psi where all of a facet faces the
+master, and their sum is 1 everywhere, so that uniform tractions press bulges as they should.
 """
 
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
-from .dual import dual_functions, nodes_with_multiplier
+from .dual import dual_functions, nodes_with_multiplier, sharing_functions
 from .facet_integrals import FacetPairs
 from .facing import Skin, candidates, nearest, seen_through, shapes
 
@@ -22,6 +31,7 @@ Array = NDArray[np.float64]
 Index = NDArray[np.int64]
 Mask = NDArray[np.bool_]
 HARDLY = 0.1  # part of a node's area that has to face the master for it to carry force
+ROUNDING = 1e-12  # of a facet: what does not face the master where all of it does
 SLIVER = 1e-8  # part of a facet; biorthogonal functions on less are lost in rounding
 
 
@@ -30,7 +40,8 @@ class Shared:
     """k pairs of facets, slave and master (k,), on `facets` (f,) of the slave; of (k,): which.
 
     own (f, a, a + e), cross (k, a, b + h): integrals with corners and middles of slave and
-    master; psi (f, a, a): A of `current_slopes`; kept (f, a): slots that carry force.
+    master; psi (f, a, a): A of `current_slopes`; kept (f, a): slots that carry force; even
+    (f, a, a): phi of (1) in phi; covered (f,): c.
     """
 
     slave: Index
@@ -41,6 +52,8 @@ class Shared:
     cross: Array
     psi: Array
     kept: Mask
+    even: Array
+    covered: Array
 
     @classmethod
     def at(cls, pair: MortarPair, x: Array, without: Mask) -> Shared:
@@ -72,7 +85,10 @@ class Shared:
         least = HARDLY if pair.areas is None else 0.0
         kept = _carrying(slave, facets, mass, whole, without, least)
         psi = dual_functions(mass, kept, slave.real[facets])
-        return cls(of, other, facets, numbers, total, cross, psi, kept)
+        even = sharing_functions(kept, slave.real[facets])
+        covered = mass.sum(axis=(1, 2)) / whole[facets]
+        covered = np.where(np.abs(covered - 1) < ROUNDING, 1.0, covered)
+        return cls(of, other, facets, numbers, total, cross, psi, kept, even, covered)
 
     @property
     def mass(self) -> Array:
@@ -83,6 +99,19 @@ class Shared:
     def weights(self) -> Array:
         """W, (f, a)."""
         return np.where(self.kept, self.mass.sum(axis=2), 0.0)
+
+    @cached_property
+    def blend(self) -> tuple[Array, Array]:
+        """theta of (1) and its derivative by c, (f,) each."""
+        c = np.minimum(self.covered, 1.0)
+        t = c * c
+        return t * t * (3 - 2 * t), 12 * c * t * (1 - t)
+
+    @cached_property
+    def chi(self) -> Array:
+        """chi of (1) in phi, (f, a, a)."""
+        theta = self.blend[0][:, None, None]
+        return theta * self.psi + (1 - theta) * self.even
 
     @property
     def inverse(self) -> Array:

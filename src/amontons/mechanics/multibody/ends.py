@@ -5,38 +5,36 @@ from __future__ import annotations
 import numpy as np
 
 from ...core.compiled import njit
-from .rows import rotations, row_impulses, turned, turned_freely
+from .free_rotation import turned_freely, twice_energy
+from .rows import rotations, row_impulses
 
 
 @njit(cache=True, error_model="numpy")
-def middle_of(position, orientation, velocity, spin, h):
-    """Positions (n, 3) and rotations (n, 3, 3) in the middle of a step h, as bodies move."""
-    half = 0.5 * h
-    return position + half * velocity, rotations(turned(orientation, half * spin))
+def middle_of(position, orientation, velocity, spin, bodies, h):  # noqa: PLR0913
+    """Half a step h as bodies move freely; bodies: see `ended`.
 
-
-@njit(cache=True, error_model="numpy")
-def freely(velocity, spin, inertia, gravity, h):
-    """Velocities after a step h without reactions, angular ones in own axes after half of it.
-
-    All (n, 3).  The other half follows after the impulses, in `ended`: they act in the middle.
+    Positions (n, 3), quaternions (n, 4), rotations (n, 3, 3) and angular velocities (n, 3) in
+    own axes.
+    The other half follows after the impulses, in `ended`: they act in the middle.
     """
-    return velocity + h * gravity, turned_freely(inertia, spin, 0.5 * h)
+    half = 0.5 * h
+    Q, spun = turned_freely(bodies[1], bodies[2], orientation, spin, half)
+    return position + half * velocity, Q, rotations(Q), spun
 
 
 @njit(cache=True, error_model="numpy")
-def ended(rows, r, couples, R, bodies, gravity, h, begin, motion, free):  # noqa: PLR0913
+def ended(rows, r, couples, middle, bodies, gravity, h, begin, motion):  # noqa: PLR0913
     """Position, orientation, velocity and spin after impulses r of the rows, and energies.
 
-    couples (n, 3): angular impulses on the bodies besides, in global axes.
-
-    R: in the middle; bodies: masses (n,), inertia and its inverse (n, 3, 3) in own axes;
-    begin (n, 3): positions before overlaps were mended, motion: after that, as `Motion`; free:
-    of `freely`.  Energies: kinetic, potential, gain, of contacts, of mending.
+    couples (n, 3): angular impulses on the bodies besides, in global axes; middle: of
+    `middle_of`; bodies: masses (n,), inertia and its inverse (n, 3, 3) in own axes; begin
+    (n, 3): positions before overlaps were mended, motion: after that, as `Motion`.  Energies:
+    kinetic, potential, gain, of contacts and joints, of mending.
     """
     masses, inertia, inverse = bodies
     slave, master, axes, arms, master_arms = rows
-    position, orientation, velocity, spin = motion
+    position, _, velocity, spin = motion
+    _, Q, R, spun = middle
     push, turn = row_impulses(slave, master, axes, arms, master_arms, r, len(masses))
     turn += couples
     after, turning = np.empty_like(velocity), np.empty_like(spin)
@@ -48,32 +46,23 @@ def ended(rows, r, couples, R, bodies, gravity, h, begin, motion, free):  # noqa
         for i in range(3):
             own[i] = R[b, 0, i] * turn[b, 0] + R[b, 1, i] * turn[b, 1] + R[b, 2, i] * turn[b, 2]
         for i in range(3):
-            after[b, i] = free[0][b, i] + push[b, i] / masses[b]
-            turning[b, i] = free[1][b, i]
+            after[b, i] = velocity[b, i] + h * gravity[i] + push[b, i] / masses[b]
+            turning[b, i] = spun[b, i]
             for k in range(3):
                 turning[b, i] += inverse[b, i, k] * own[k]
             x[b, i] = position[b, i] + 0.5 * h * (velocity[b, i] + after[b, i])
             contact += 0.5 * push[b, i] * (velocity[b, i] + after[b, i])
-            contact += 0.5 * own[i] * (free[1][b, i] + turning[b, i])
+            contact += 0.5 * own[i] * (spun[b, i] + turning[b, i])
             moved += after[b, i] * after[b, i]
             before += velocity[b, i] * velocity[b, i]
             weight = masses[b] * gravity[i]
             gain -= weight * (x[b, i] - begin[b, i])
             potential -= weight * x[b, i]
             mending -= weight * (position[b, i] - begin[b, i])
-        new = 0.5 * (masses[b] * moved + _twice_turning(inertia[b], turning[b]))
-        old = 0.5 * (masses[b] * before + _twice_turning(inertia[b], spin[b]))
+        new = 0.5 * (masses[b] * moved + twice_energy(inertia[b], turning[b]))
+        old = 0.5 * (masses[b] * before + twice_energy(inertia[b], spin[b]))
         kinetic += new
         gain += new - old
-    turning = turned_freely(inertia, turning, 0.5 * h)  # keeps the energy
-    angle = 0.5 * h * (spin + turning)
+    turned, left = turned_freely(inertia, inverse, Q, turning, 0.5 * h)  # keeps the energy
     energies = kinetic, potential, gain, contact, mending
-    return (x, turned(orientation, angle), after, turning), energies
-
-
-@njit(cache=True, error_model="numpy")
-def _twice_turning(J, W):
-    total = 0.0
-    for i in range(3):
-        total += W[i] * (J[i, 0] * W[0] + J[i, 1] * W[1] + J[i, 2] * W[2])
-    return total
+    return (x, turned, after, left), energies

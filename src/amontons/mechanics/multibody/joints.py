@@ -15,8 +15,13 @@ can slide, as a turntable on a floor with a hinge about the normal: it takes par
 friction, though equilibrium of rigid bodies does not say which part of the load it carries and
 which the joints; `undetermined` names it.
 
-W_JJ^+ is (W_JJ + e)^-1 with a small e: rows that say something twice get equal shares.  It
-is a part of the mean diagonal of those joints that are linked by bodies, of no others.
+Joints are closed at the end of a step by impulses of its middle, which Newton's method finds
+for joints alone from the free turning of their bodies (`bonds.closed_by`). Of a body that turns
+by an angle 2 p about an axis, the arms R_m X get those of the chord, the mean of R0 X and R1 X
+by tan(p) / p across the axis: with them a plane motion has u1 = -u_m and closes. In space what
+is left gives velocities c, of third order in h, and u1 = c - u_m. (With c = 0 and arms of the
+middle, sides part by a third power of h and velocities leave the joints, which is all that a
+fast top loses; with c and arms of the middle joints work to and fro by a second power.)
 """
 
 from __future__ import annotations
@@ -27,61 +32,59 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import sparse
 from scipy.sparse.csgraph import connected_components
-from scipy.sparse.linalg import SuperLU, splu
 
+from ...solvers.newton.block_lu import analyse_pattern
 from .bodies import GROUND, RigidBodies
-from .rows import Rows, impulses, levers_of, rotations, velocities
+from .bonds import (
+    Pattern,
+    closed_by,
+    factorised,
+    global_inverse,
+    joint_rows,
+    kept_to,
+    left_of,
+    pulled_by,
+)
+from .rows import Rows, delassus, levers_of, rotations
 from .states import Motion
 
 Array = NDArray[np.float64]
 Index = NDArray[np.int64]
-SMALL = 1e-12  # e over the mean of the diagonal of W_JJ
-DECIDED = 1e-9  # of |g|^2: what is left of a contact that joints decide; SMALL is in it
+DECIDED = 1e-9  # of |g|^2: what is left of a contact that joints decide
 ALIKE = 1e-6  # of the largest principal moment of inertia, moments of an axis of symmetry
-AT_ONCE = 64  # contacts whose X are formed together, dense
-
-
-def lever_matrix(levers: Array, sides: Index, bodies: int) -> Any:
-    """Sparse G (k n, 6 bodies) of levers (n, 2, k, 6) on the bodies sides (n, 2), < 0 none."""
-    n, _, k, _ = levers.shape
-    contact, side = np.nonzero(sides >= 0)
-    shape = len(contact), k, 6
-    row = np.broadcast_to((k * contact[:, None] + np.arange(k))[:, :, None], shape)
-    column = 6 * sides[contact, side][:, None] + np.arange(6)
-    column = np.broadcast_to(column[:, None, :], shape)
-    values = levers[contact, side].ravel()
-    size = k * n, 6 * bodies
-    return sparse.coo_array((values, (row.ravel(), column.ravel())), size).tocsr()
 
 
 class Hung(NamedTuple):
     """How nc contacts hang on k joints.
 
-    shared: G_J g^T, sparse (3 k, nc), of their normals; factors: W_JJ^+; loose (nc,): joints do
-    not decide the motion along the normal; idle (nc,): they decide all of it.
+    normals (nc, 2, 6), sides (nc, 2): levers of their normals on their bodies; bonds: the
+    joints, as `bonds.pulled_by` takes them; loose (nc,): joints do not decide the motion along
+    the normal; idle (nc,): they decide all of it.
     """
 
-    shared: Any
-    factors: SuperLU
+    normals: Array
+    sides: Index
+    bonds: tuple[Any, ...]
     loose: NDArray[np.bool_]
     idle: NDArray[np.bool_]
 
     def only(self, kept: NDArray[np.bool_]) -> Hung:
         """The same without the contacts that are not kept, (nc,)."""
         return self._replace(
-            shared=self.shared[:, kept], loose=self.loose[kept], idle=self.idle[kept]
-        )
+            normals=self.normals[kept], sides=self.sides[kept], loose=self.loose[kept],
+            idle=self.idle[kept],
+        )  # fmt: skip
 
-    def pulled(self, u: Array) -> Array:
+    def pulled(self, u: Array, bodies: int) -> Array:
         """X^T u, (nc,), of velocities u (k, 3) of the joints."""
-        return self.shared.T @ self.factors.solve(u.ravel())
+        return pulled_by(self.normals, self.sides, *self.bonds, u, bodies)
 
 
 class Joints:
     """The joints of a system; points are fixed to the bodies as they are given."""
 
-    def __init__(self, system: RigidBodies, masses: Array, inverse: Array) -> None:
-        self.masses, self.inverse = masses, inverse
+    def __init__(self, system: RigidBodies, masses: tuple[Array, Array, Array]) -> None:
+        self.bodies = masses
         bodies, joints = system.bodies, system.joints
         self.first = np.array([joint.first for joint in joints], dtype=np.int64)
         self.second = np.array([joint.second for joint in joints], dtype=np.int64)
@@ -91,7 +94,7 @@ class Joints:
         pairs = self.first, np.where(self.second == GROUND, self.first, self.second)
         graph = sparse.coo_array((np.ones(len(joints)), pairs), (len(bodies), len(bodies)))
         groups = connected_components(graph, directed=False)[1][self.first]
-        self.linked = np.unique(groups, return_inverse=True)[1]  # its group, of each joint
+        linked = np.unique(groups, return_inverse=True)[1]  # its part, of each joint
         x = np.array([body.position for body in bodies])
         R = rotations(np.array([body.orientation for body in bodies]))
         point = np.array([joint.point for joint in joints], dtype=float).reshape(-1, 3)
@@ -99,65 +102,80 @@ class Joints:
         own = np.einsum("jki,jk->ji", R[first], point - x[first])
         other = np.einsum("jki,jk->ji", R[second], point - x[second])
         self.anchors = own, np.where(on_ground[:, None], point, other)
+        rows, _ = joint_rows(first, second, self.anchors, x, R)
+        indptr, indices, *_ = delassus(Rows(*rows), masses[0], masses[2])
+        order = analyse_pattern(indptr, indices).arrays
+        self.pattern = tuple(Pattern(indptr, indices, order, linked))
         self.crosswise = np.array([_crosswise(np.array(body.inertia)) for body in bodies])
 
     def energy(self, motion: Motion) -> float:
         """Kinetic energy without that of spin about axes of symmetry, which joints leave."""
         turning = np.einsum("bi,bij,bj->", motion.spin, self.crosswise, motion.spin)
-        return 0.5 * float(self.masses @ (motion.velocity**2).sum(axis=1) + turning)
+        return 0.5 * float(self.bodies[0] @ (motion.velocity**2).sum(axis=1) + turning)
 
     def rows(self, x: Array, R: Array) -> tuple[Rows, Array]:
         """Rows of joints of bodies at x, turned by R, and how far sides are apart, (k, 3)."""
-        first, second = self.first, self.second
-        own = np.einsum("jik,jk->ji", R[first], self.anchors[0])
-        other = np.einsum("jik,jk->ji", R[second], self.anchors[1])
-        on_ground = (second == GROUND)[:, None]
-        fixed = np.where(on_ground, self.anchors[1], x[second] + other)
-        axes = np.tile(np.eye(3), (len(first), 1, 1))
-        return Rows(first, second, axes, own, other), x[first] + own - fixed
+        rows, apart = joint_rows(self.first, self.second, self.anchors, x, R)
+        return Rows(*rows), apart
 
-    def _levers(self, rows: Rows, R: Array) -> tuple[Array, Index]:
-        inverse = R @ self.inverse @ R.swapaxes(1, 2)
-        return levers_of(*rows, self.masses, inverse), np.stack([rows.slave, rows.master], 1)
+    def factor(self, rows: Rows, R: Array) -> tuple[tuple[Any, ...], Array]:
+        """W_JJ and its factor for bodies turned by R, and their inverse inertia there."""
+        inverse = global_inverse(R, self.bodies[2])
+        return factorised(tuple(rows), self.pattern, self.bodies[0], inverse), inverse
 
-    def _mobility(self, rows: Rows, R: Array) -> tuple[Any, Any]:
-        """G_J, sparse, and W_JJ^+ as factors."""
-        G = lever_matrix(*self._levers(rows, R), len(self.masses))
-        W = G @ G.T
-        own = W.diagonal().reshape(-1, 3).mean(axis=1)
-        e = SMALL * np.bincount(self.linked, own) / np.bincount(self.linked)
-        return G, splu((W + sparse.diags_array(np.repeat(e[self.linked], 3))).tocsc())
+    def kept(self, motion: Motion) -> tuple[Motion, Array, Array, tuple[float, float]]:
+        """A motion that keeps to the joints, impulses, sides apart (k, 3), energy and work."""
+        R = rotations(motion.orientation)
+        rows, apart = self.rows(motion.position, R)
+        factor, inverse = self.factor(rows, R)
+        v, spin, r, gained, work = kept_to(
+            tuple(rows), self.pattern, factor, self.bodies, inverse, R, motion.velocity,
+            motion.spin,
+        )  # fmt: skip
+        return motion._replace(velocity=v, spin=spin), r, apart, (gained, work)
 
-    def kept(
-        self, velocity: Array, omega: Array, x: Array, R: Array
-    ) -> tuple[Array, Array, Array, float]:
-        """Velocities (n, 3) that keep to the joints, impulses (k, 3), and their work."""
-        rows, _ = self.rows(x, R)
-        before = velocities(rows, velocity, omega)
-        r = -self._mobility(rows, R)[1].solve(before.ravel()).reshape(-1, 3)
-        push, turn = impulses(rows, r, len(self.masses))
-        after = velocity + push / self.masses[:, None]
-        turned = np.einsum("bij,bj->bi", R @ self.inverse @ R.swapaxes(1, 2), turn) + omega
-        work = 0.5 * float(np.sum(r * (before + velocities(rows, after, turned))))
-        return after, turned, r, work
+    def closed(
+        self, begin: Array, middle: tuple[Any, ...], v: Array, h: float, gravity: Array
+    ) -> tuple[Rows, Array, Array]:
+        """Rows of a step, impulses r (k, 3) that close joints at its end, and c (k, 3)."""
+        rows, r, c = closed_by(
+            tuple(self.rows(middle[0], middle[2])[0]), self.pattern, self.anchors, self.bodies,
+            rotations(begin), middle, v, h, gravity,
+        )  # fmt: skip
+        return Rows(*rows), r, c
+
+    def bonds(self, rows: Rows, R: Array) -> tuple[tuple[Any, ...], Array]:
+        """What contacts hang on, see `Hung`, and the inverse inertia of bodies turned by R."""
+        factor, inverse = self.factor(rows, R)
+        levers = levers_of(*rows, self.bodies[0], inverse)
+        return (levers, sides_of(rows), self.pattern, factor), inverse
 
     def hung(self, contacts: Rows, joints: Rows, R: Array, mu: float) -> Hung | None:
         """How contacts hang on the joints; None where none of them has a jointed body."""
         theirs = self.jointed[contacts.slave] | self.jointed[contacts.master]
         if not theirs.any():
             return None
-        G, factors = self._mobility(joints, R)
-        levers, sides = self._levers(contacts, R)
-        normals = lever_matrix(levers[:, :, :1], sides, len(self.masses))
-        shared = (G @ normals.T).tocsc()
+        bonds, inverse = self.bonds(joints, R)
+        levers, sides = levers_of(*contacts, self.bodies[0], inverse), sides_of(contacts)
         loose = np.ones(len(theirs), dtype=bool)
-        loose[theirs] = _left(normals[theirs], shared[:, theirs], factors)
+        normals, tangents = levers[:, :, :1], levers[:, :, 1:]
+        loose[theirs] = self._left(normals, sides, theirs, bonds)[:, 0]
         idle = ~loose
         if mu > 0 and idle.any():
-            tangents = lever_matrix(levers[idle, :, 1:], sides[idle], len(self.masses))
-            slides = _left(tangents, (G @ tangents.T).tocsc(), factors).reshape(-1, 2)
-            idle[idle] = ~slides.any(axis=1)
-        return Hung(shared, factors, loose, idle)
+            idle[idle] = ~self._left(tangents, sides, idle, bonds).any(axis=1)
+        return Hung(np.ascontiguousarray(normals[:, :, 0]), sides, bonds, loose, idle)
+
+    def _left(
+        self, levers: Array, sides: Index, those: NDArray[np.bool_], bonds: tuple[Any, ...]
+    ) -> NDArray[np.bool_]:
+        """Where joints leave something of rows (n, 2, m, 6), (those, m)."""
+        few = np.ascontiguousarray(levers[those])
+        return left_of(few, sides[those], *bonds, len(self.bodies[0])) > DECIDED
+
+
+def sides_of(rows: Rows) -> Index:
+    """Bodies (n, 2) of each row."""
+    return np.ascontiguousarray(np.stack([rows.slave, rows.master], axis=1))
 
 
 def _crosswise(inertia: Array) -> Array:
@@ -166,13 +184,3 @@ def _crosswise(inertia: Array) -> Array:
     low, high = np.diff(values) <= ALIKE * values[-1]  # the lower two alike, the upper two
     kept = values * [not high, not (low and high), not low]
     return (axes * kept) @ axes.T
-
-
-def _left(rows: Any, shared: Any, factors: SuperLU) -> NDArray[np.bool_]:
-    """Of which rows (n, 6 b) joints leave something free, by shared = G_J rows^T."""
-    whole = rows.multiply(rows).sum(axis=1)
-    decided = np.zeros(len(whole))
-    for k in range(0, len(whole), AT_ONCE):
-        some = shared[:, k : k + AT_ONCE].toarray()
-        decided[k : k + AT_ONCE] = (some * factors.solve(some)).sum(axis=0)
-    return whole - decided > DECIDED * whole

@@ -3,31 +3,33 @@
 Moreau's midpoint rule with finite rotations.  From x0, Q0, v0 and W0, the angular velocity in
 own axes, to the end of a step h:
 
-    x_m = x0 + h v0 / 2,  Q_m = Q0 exp(h W0 / 2)                   where contacts are looked for
+    x_m = x0 + h v0 / 2,  Q_m, W_f = Q0, W0 after h / 2            where contacts are looked for
     m (v1 - v0) = h m g + P,    J (W_r - W_f) = R_m^T T            P, T of the impulses r
-    x1 = x0 + h (v0 + v1) / 2,  Q1 = Q0 exp(h (W0 + W1) / 2)
+    x1 = x0 + h (v0 + v1) / 2,  Q1, W1 = Q_m, W_r after h / 2
 
-with W_f after half a step h / 2 without contact from W0 (`rows.turned_freely`), and W1 after
-the other half from W_r.  (With a whole free step before the impulses a spinning top, whose
-moment and spin are about different axes, would lose energy and moment of momentum of first
-order in h.)  Contacts whose gap at the midpoint is not positive take part, with the law between
-r and u1 + e u0_N, where u0 is of v0 and W_f and u1 of v1 and W_r ([M]; with min(u0_N, 0) a
-contact that parts and is pressed by another impact would gain energy).  What an impact leaves
-of overlap, h |u_N| / 2 at most, and joints lose by turning, is mended where it is more than
-`overlap`: by the smallest displacements, in the metric of the masses, that take it away.  What
-was mended takes part, though rotations open it by their squares.  (A law that lets open
-contacts close without overlap, u1_N >= -gap / h, turns a rocking block round a step too early
-at each impact; at the same step its times are wrong by six times as much.)
+Turning without contact is exact (`free_rotation`), so that moments of momentum stay: W_f, Q_m
+are those after half of it from W0, Q0, and W1, Q1 after the other half from W_r. (With a whole
+free step before the impulses a spinning top, whose moment and spin are about different axes,
+would lose energy and moment of momentum of first order in h.) Contacts whose gap at the
+midpoint is not positive take part, with the law between r and u1 + e u0_N, where u0 is of v0
+and W_f and u1 of v1 and W_r ([M]; with min(u0_N, 0) a contact that parts and is pressed by
+another impact would gain energy). What an impact leaves of overlap, h |u_N| / 2 at most, and
+joints lose by turning, is mended where it is more than `overlap`: by the smallest
+displacements, in the metric of the masses, that take it away. What was mended takes part,
+though rotations open it by their squares. (A law that lets open contacts close without overlap,
+u1_N >= -gap / h, turns a rocking block round a step too early at each impact; at the same step
+its times are wrong by six times as much.)
 
 Velocities are made to keep to the joints where a step begins (`joints`), and joints take back
 beyond the middle what they turned away from before it: with u_m of these velocities and of W_f,
-with arms at the middle of the step,
+with arms of the step's chord and c of third order in h that closes them at its end (`joints`),
 
-    u1 = -u_m    for joints,    u1_N >= min(X^T (-u_m), 0)    for contacts that hang on them
+    u1 = c - u_m    for joints,    u1_N >= min(X^T u1, 0)    for contacts that hang on them
 
-so that joints do no work in the step.  (u1 = 0, the law of sticking contacts, takes from a
-pendulum a part of its energy of first order: 7 % in five swings of 2 000 steps each.)  What
-joints take at the beginning of a step is all of a jolt, and else of third order in the whole.
+so that joints work r . c / 2 in the step, nothing in a plane. (u1 = 0, the law of sticking
+contacts, takes from a pendulum a part of its energy of first order: 7 % in five swings of 2 000
+steps each.) What joints take at the beginning of a step is all of a jolt, and else of third
+order in the whole.
 Contacts may take part in the motion by which joints are mirrored, or one near a joint would
 stop or throw the body; what joints decide altogether is no contact, and where they decide the
 normal alone it is one for the sake of its friction.  Overlaps of both kinds are left: mending
@@ -62,14 +64,15 @@ from ...solvers.asked import Asked
 from ...solvers.contract import Iterate, Solver
 from ...solvers.driver import drive_as_asked
 from .bodies import RigidBodies
-from .ends import ended, freely, middle_of
+from .ends import ended, middle_of
 from .guides import between_planes, least_squeezed
 from .joints import Joints
 from .meeting import meetings
 from .met import Met
+from .mirrored import closed, mirror_inplace
 from .quick import Found, Posed, law_of, matched, pose
 from .rolling import couples, rolling_problem
-from .rows import Rows, delassus, impulses, rotations, rows_at, turned, velocities
+from .rows import Rows, delassus, impulses, rotations, rows_at, turned
 from .states import (
     Motion,
     RigidEnergies,
@@ -179,7 +182,7 @@ class _Stepping:
         self.no_couples = np.zeros((len(masses), 3))
         self.near = TOUCHING * system.packed.reach
         self.normals: Array = system.packed.planes[:, :3]
-        self.joints = Joints(system, masses, self.inverse) if len(system.joints) else None
+        self.joints = Joints(system, self.bodies) if len(system.joints) else None
         self.told = False  # that friction is undetermined
 
     # ------------------------------------------------------------------ a step
@@ -187,50 +190,58 @@ class _Stepping:
         """One step from a state to a time."""
         h, before = self.h, state.motion
         gravity = np.array(self.system.gravity_at(time - 0.5 * h))
-        before, jolt, (lost, taken) = self._kept(before)
+        jolt, sides, (lost, taken) = NOTHING, NOTHING, (0.0, 0.0)
+        if self.joints is not None:
+            before, jolt, sides, (lost, taken) = self.joints.kept(before)
         begin, masses = before.position, self.bodies[0]
-        middle = middle_of(*before, h)
-        at = self._rows(*middle)
-        mended = self._mended(at, middle[1], f"step {state.index + 1}", deadline)
+        middle = middle_of(*before, self.bodies, h)
+        at = self._rows(middle[0], middle[2], sides)
+        mended = self._mended(at, middle[2], f"step {state.index + 1}", deadline)
         if mended is not None:
             moved, gaps = mended
             before = self._shifted(before, moved, rotations(before.orientation))
-            middle = middle_of(*before, h)
+            middle = middle_of(*before, self.bodies, h)
             reach = self.system.packed.reach
             angle = np.linalg.norm(moved[1], axis=1)
             far = np.linalg.norm(moved[0], axis=1) + angle * reach > FAR * self.system.size
             if far.any():  # rotations lift what was mended by their squares
-                at = self._rows(*middle, angle**2 * reach)
+                at = self._rows(middle[0], middle[2], sides, angle**2 * reach)
             else:
                 at = self._closed(at, gaps)
-        R, nc = middle[1], len(at.keys)
-        free = freely(before.velocity, before.spin, self.bodies[1], gravity, h)
-        solved, r, moments, turn = None, np.zeros((0, 3)), NOTHING, self.no_couples
+        R, spun, nc = middle[2], middle[3], len(at.keys)
+        free = before.velocity + h * gravity, spun
+        solved, r, moments, turn, worked = None, np.zeros((0, 3)), NOTHING, self.no_couples, 0.0
         if len(at.rows.slave):
+            pull = closing = NOTHING
+            if self.joints is not None:
+                at, pull, closing = closed(self.joints, at, before, middle, h, gravity)
             posed = Posed(*pose(
-                at.rows, nc, (masses, self.inverse, R), (before.velocity, free[1]), free,
+                at.rows, nc, (masses, self.inverse, R), (before.velocity, spun), free,
                 self.system.restitution, at.keys, (state.keys, state.impulses),
             ))  # fmt: skip
-            if len(at.apart):
-                self._mirror(at, R, before.velocity, free[1], posed.q)
+            if self.joints is not None:
+                mirror_inplace(at, middle, before.velocity, pull, closing, posed)
             what = f"step {state.index + 1}"
             if self.system.has_moments:
                 posed = self._unsqueezed(at.rows, R, posed, nc, deadline)
-                solved = self._rolled(at, R, posed, free[1], state, what, deadline)
+                solved = self._rolled(at, R, posed, spun, state, what, deadline)
                 r, moments = solved.r[:, :3].copy(), solved.r[:, 3:].copy()
                 turn = couples(at.rows, moments, len(masses))
             else:
                 solved = self._solve(at.rows, R, posed, nc, what, deadline)
                 r = solved.r if isinstance(solved, Found) else solved.r.copy()
+                worked = 0.5 * float(np.sum(r[nc:] * closing))
         motion, energies = ended(
-            at.rows, r, turn, R, self.bodies, gravity, h, begin, tuple(before), free
+            at.rows, r, turn, middle, self.bodies, gravity, h, begin, tuple(before)
         )
         kinetic, potential, gain, contact, mending = energies
-        done = RigidEnergies(kinetic, potential, gain + lost, contact, mending, taken)
+        done = RigidEnergies(
+            kinetic, potential, gain + lost, contact - worked, mending, taken + worked
+        )
         fallen = 0.5 * float(masses.sum() * (h * gravity) @ (h * gravity))
         end = Motion(*motion)
         busy = self.joints.energy(end) if self.joints is not None else kinetic
-        loss = state.loss_after(taken, busy, fallen, self.asked.tolerance)
+        loss = state.loss_after(done.joints, busy, fallen, self.asked.tolerance)
         new = RigidState(state.index + 1, time, end, at.keys, r[:nc], moments, *loss, end)
         said = self._said_of(state, new) + self._undetermined(at)
         return RigidStep(self.system, new, at.found, at.rows.axes[:nc], r[:nc], r[nc:] + jolt,
@@ -252,14 +263,17 @@ class _Stepping:
         which = int(np.argmin(at.loose))
         return undetermined(self.system, *at.keys[which, :2].tolist())
 
-    def _rows(self, x: Array, R: Array, apart: Array | float = 0.0) -> Met:
-        """Contacts and joints of bodies at x, turned by R; apart (n,): gaps that count."""
+    def _rows(self, x: Array, R: Array, sides: Array, apart: Array | float = 0.0) -> Met:
+        """Contacts and joints of bodies at x, turned by R; apart (n,): gaps that count.
+
+        sides (k, 3): how far those of joints are apart where the step begins.
+        """
         found = meetings(self.system.packed, x, R, self.near + apart)
         keys, axes, arms, others, deepest = rows_at(*found, x)
         rows = Rows(found.slave, found.master, axes, arms, others)
         if self.joints is None:
             return Met(found, keys, rows, NOTHING, None, deepest)
-        joints, sides = self.joints.rows(x, R)
+        joints = self.joints.rows(x, R)[0]
         hung = self.joints.hung(rows, joints, R, self.system.mu)
         rows_of_all: list[Any] = [np.concatenate(p) for p in zip(rows, joints, strict=True)]
         both = Rows(*rows_of_all)
@@ -276,30 +290,6 @@ class _Stepping:
         apart = np.where(found.master >= 0, self.near[found.master], 0.0)
         kept = (gaps <= self.near[found.slave] + apart) | ~at.loose
         return at._replace(found=found._replace(gaps=gaps), deepest=0.0).only(kept)
-
-    def _kept(self, motion: Motion) -> tuple[Motion, Array, tuple[float, float]]:
-        """A motion that keeps to the joints, their impulses (k, 3), kinetic energy and work."""
-        if self.joints is None:
-            return motion, NOTHING, (0.0, 0.0)
-        R = rotations(motion.orientation)
-        omega = np.einsum("bij,bj->bi", R, motion.spin)
-        v, turning, jolt, work = self.joints.kept(motion.velocity, omega, motion.position, R)
-        kept = motion._replace(velocity=v, spin=np.einsum("bij,bi->bj", R, turning))
-        return kept, jolt, (self._kinetic(kept) - self._kinetic(motion), work)
-
-    def _kinetic(self, motion: Motion) -> float:
-        masses, inertia, _ = self.bodies
-        turning = np.einsum("bi,bij,bj->b", motion.spin, inertia, motion.spin)
-        return 0.5 * float((masses * (motion.velocity**2).sum(axis=1) + turning).sum())
-
-    def _mirror(self, at: Met, R: Array, v: Array, spin: Array, q: Array) -> None:
-        """Add to free velocities q (n, 3) what joints take back; spin (n, 3): W_f."""
-        nc = len(at.keys)
-        those: list[Any] = [part[nc:] for part in at.rows]
-        u_m = velocities(Rows(*those), v, np.einsum("bij,bj->bi", R, spin))
-        q[nc:] += u_m
-        if at.hung is not None:
-            q[:nc, 0] -= np.minimum(-at.hung.pulled(u_m), 0.0)
 
     # ------------------------------------------------------------------ problems
     def _solve(

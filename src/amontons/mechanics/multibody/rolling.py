@@ -11,16 +11,30 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy import sparse
 
 from ...problem.law.rolling import RollingFriction
 from ...problem.rolling import RollingProblem
-from .joints import lever_matrix
 from .rows import Rows, levers_of
 
 if TYPE_CHECKING:
     from .bodies import RigidBodies
 
 Array = NDArray[np.float64]
+Index = NDArray[np.int64]
+
+
+def lever_matrix(levers: Array, sides: Index, bodies: int) -> Any:
+    """Sparse G (k n, 6 bodies) of levers (n, 2, k, 6) on the bodies sides (n, 2), < 0 none."""
+    n, _, k, _ = levers.shape
+    contact, side = np.nonzero(sides >= 0)
+    shape = len(contact), k, 6
+    row = np.broadcast_to((k * contact[:, None] + np.arange(k))[:, :, None], shape)
+    column = 6 * sides[contact, side][:, None] + np.arange(6)
+    column = np.broadcast_to(column[:, None, :], shape)
+    values = levers[contact, side].ravel()
+    size = k * n, 6 * bodies
+    return sparse.coo_array((values, (row.ravel(), column.ravel())), size).tocsr()
 
 
 def rolling_problem(

@@ -21,8 +21,6 @@ from .apart import cross
 
 Array = NDArray[np.float64]
 Index = NDArray[np.int64]
-STEPS = 30  # of Newton's method for a body that turns freely
-CLOSE = 1e-15  # relative change at which it ends
 
 
 class Rows(NamedTuple):
@@ -248,92 +246,27 @@ def row_impulses(slave, master, axes, arms, master_arms, r, bodies):  # noqa: PL
 
 
 @njit(cache=True, error_model="numpy")
-def turned_freely(inertia, spin, h):
-    """Angular velocities (b, 3) in own axes after a step h without torque, from spin (b, 3).
-
-    J (W1 - W0) + h W x J W = 0 with the mean W of both, which keeps the energy exactly.
-    """
-    out = spin.copy()
-    mean, moment, rest, unit = np.empty(3), np.empty(3), np.empty(3), np.empty(3)
-    slope = np.empty((3, 3))
-    for b in range(len(spin)):
-        J, before, after = inertia[b], spin[b], out[b]
-        size = max(abs(before[0]), abs(before[1]), abs(before[2]))
-        for _ in range(STEPS):
-            for i in range(3):
-                mean[i] = 0.5 * (before[i] + after[i])
-            for i in range(3):
-                moment[i] = rest[i] = 0.0
-                for k in range(3):
-                    moment[i] += J[i, k] * mean[k]
-                    rest[i] += J[i, k] * (after[k] - before[k])
-            turning = cross(mean, moment)
-            for i in range(3):
-                rest[i] += h * turning[i]
-            for k in range(3):
-                for i in range(3):
-                    unit[i] = 1.0 if i == k else 0.0
-                one, two = cross(unit, moment), cross(mean, J[:, k])
-                for i in range(3):
-                    slope[i, k] = J[i, k] + 0.5 * h * (one[i] + two[i])
-            _solve_inplace(slope, rest)
-            moved = 0.0
-            for i in range(3):
-                after[i] -= rest[i]
-                moved = max(moved, abs(rest[i]))
-            if moved <= CLOSE * size:
-                break
-    return out
-
-
-@njit(cache=True, error_model="numpy")
-def _solve_inplace(A, b):
-    """b (3,) becomes A^-1 b; A (3, 3) is eliminated, largest pivots first.
-
-    Raises LinAlgError where that is no number.
-    """
-    for k in range(3):
-        best = k
-        for i in range(k + 1, 3):
-            if abs(A[i, k]) > abs(A[best, k]):
-                best = i
-        for j in range(k, 3):
-            A[k, j], A[best, j] = A[best, j], A[k, j]
-        b[k], b[best] = b[best], b[k]
-        for i in range(k + 1, 3):
-            factor = A[i, k] / A[k, k]
-            for j in range(k + 1, 3):
-                A[i, j] -= factor * A[k, j]
-            b[i] -= factor * b[k]
-    for k in range(2, -1, -1):
-        for j in range(k + 1, 3):
-            b[k] -= A[k, j] * b[j]
-        b[k] /= A[k, k]
-        if not np.isfinite(b[k]):
-            raise np.linalg.LinAlgError("the turning of a body is not finite")
-
-
-@njit(cache=True, error_model="numpy")
 def turned(orientation, angle):
     """Quaternions (b, 4) times those of rotations by angle (b, 3), in own axes."""
-    out = np.empty_like(orientation)
-    for b in range(len(orientation)):
-        size = np.sqrt(angle[b, 0] ** 2 + angle[b, 1] ** 2 + angle[b, 2] ** 2)
-        half = 0.5 * size
-        factor = np.sin(half) / size if size > 1e-8 else 0.5 - size * size / 48
-        w, x, y, z = orientation[b]
-        c, i, j, k = (
-            np.cos(half),
-            factor * angle[b, 0],
-            factor * angle[b, 1],
-            factor * angle[b, 2],
-        )
-        q0, q1 = w * c - x * i - y * j - z * k, w * i + x * c + y * k - z * j
-        q2, q3 = w * j - x * k + y * c + z * i, w * k + x * j - y * i + z * c
-        length = np.sqrt(q0 * q0 + q1 * q1 + q2 * q2 + q3 * q3)
-        out[b, 0], out[b, 1] = q0 / length, q1 / length
-        out[b, 2], out[b, 3] = q2 / length, q3 / length
+    out = orientation.copy()
+    for b in range(len(out)):
+        turned_by_inplace(out[b], angle[b])
     return out
+
+
+@njit(cache=True, error_model="numpy")
+def turned_by_inplace(orientation, angle):
+    """A quaternion (4,) times that of a rotation (3,), in own axes."""
+    size = np.sqrt(angle[0] ** 2 + angle[1] ** 2 + angle[2] ** 2)
+    half = 0.5 * size
+    factor = np.sin(half) / size if size > 1e-8 else 0.5 - size * size / 48
+    w, x, y, z = orientation
+    c, i, j, k = np.cos(half), factor * angle[0], factor * angle[1], factor * angle[2]
+    q0, q1 = w * c - x * i - y * j - z * k, w * i + x * c + y * k - z * j
+    q2, q3 = w * j - x * k + y * c + z * i, w * k + x * j - y * i + z * c
+    length = np.sqrt(q0 * q0 + q1 * q1 + q2 * q2 + q3 * q3)
+    orientation[0], orientation[1] = q0 / length, q1 / length
+    orientation[2], orientation[3] = q2 / length, q3 / length
 
 
 @njit(cache=True, error_model="numpy")

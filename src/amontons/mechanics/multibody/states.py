@@ -45,13 +45,14 @@ class RigidState:
     impulses: Array  # (nc, 3) theirs, in their frames
     moments: Array = field(default_factory=lambda: np.zeros((0, 3)))  # (nc, 3) or none
     lost: float = 0.0  # energy that joints took without a jolt, an error of the steps
+    most: float = 0.0  # largest of |lost| so far
     fastest: float = 0.0  # largest energy of `Joints` so far, or what gravity gives in a step
     reached: Motion | None = field(default=None, repr=False)  # by a step; others are jolted
 
     def loss_after(
         self, work: float, kinetic: float, fallen: float, tolerance: float
-    ) -> tuple[float, float]:
-        """`lost` and `fastest` after a step from here in which joints did this work.
+    ) -> tuple[float, float, float]:
+        """`lost`, `most` and `fastest` after a step from here in which joints did this work.
 
         kinetic: energy at its end, of `Joints`; fallen: what gravity gives to free bodies in a
         step.  Bodies at rest move by errors of the solves alone: slower motion than `fallen` is
@@ -59,23 +60,23 @@ class RigidState:
         else has given may be jolted, which is no error either, but leaves errors of its solve.
         """
         if self.motion is not self.reached:
-            return self.lost, max(self.fastest, kinetic, fallen, -tolerance * work)
-        counts = -work if -work > tolerance * fallen else 0.0
-        return self.lost + counts, max(self.fastest, kinetic, fallen, -work)
+            return self.lost, self.most, max(self.fastest, kinetic, fallen, -tolerance * work)
+        lost = self.lost - (work if abs(work) > tolerance * fallen else 0.0)
+        most = max(self.most, abs(lost))
+        return lost, most, max(self.fastest, kinetic, fallen, abs(work))
 
     @property
     def doubtful(self) -> bool:
         """True where joints have taken more than `MUCH` of the energy without a jolt."""
-        return self.lost > MUCH * self.fastest
+        return self.most > MUCH * self.fastest
 
 
 @dataclass(frozen=True)
 class RigidEnergies:
     """Kinetic and potential energy at the end of a step, works within it.
 
-    joints <= 0, where the step begins: all of a jolt, and else what the size of the step costs,
-    an error of it.  In the rest of the step joints do no work but what the tolerance leaves,
-    which `contact` has in it.
+    joints: all of a jolt, where the step begins, and else what the size of the step costs or
+    gives, an error of it.  What the tolerance leaves of their work, `contact` has in it.
     """
 
     kinetic: float
@@ -187,7 +188,8 @@ def too_long(before: RigidState, after: RigidState, step: float) -> tuple[Result
     turns = step * np.linalg.norm(after.motion.spin, axis=1)
     fast = int(np.argmax(turns))
     text = (
-        f"joints have taken {100 * after.lost / after.fastest:.2g} % of the largest kinetic "
+        f"joints have {'taken' if after.lost > 0 else 'given'} "
+        f"{100 * abs(after.lost) / after.fastest:.2g} % of the largest kinetic "
         "energy that is not spin about axes of symmetry "
         f"until t = {after.time:.4g} without a jolt, by the size of the steps "
         f"(body {fast} turns by {turns[fast]:.2g} rad in this one); the loss falls with its "

@@ -237,6 +237,8 @@ def solve_eliminated(e, A, b0, b1, b2, mu, g1, g2):  # noqa: PLR0913
         bound = mu * x0
         if x0 > 0.0 and x1 * x1 + x2 * x2 <= bound * bound:
             return x0, x1, x2
+        if g1 == 0.0 and g2 == 0.0:  # open before: it slides as it would be held
+            g1, g2 = x1, x2
         found, x0, x1, x2 = _slip_near(e, A, b0, b1, b2, mu, g1, g2)
         if found:
             return x0, x1, x2

@@ -288,6 +288,11 @@ class VaryingCompliance(Law):
         """Those of the tangent at r."""
         return self.frozen(r, u).regions(r, u, rho)
 
+    def stretched(self, u: Array, r: Array | None = None) -> Array:
+        """That of the tangent at r; without r, of the inner law."""
+        law = self.inner if r is None else self.frozen(r, u)
+        return law.stretched(u, r)
+
     def augmented_reaction(self, x: Array) -> Array:
         """Raises UnsupportedLaw."""
         raise UnsupportedLaw(f"{self.name} needs reactions and small strains")

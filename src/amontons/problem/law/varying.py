@@ -217,6 +217,10 @@ class VaryingFriction(Law):
         """Those of the frozen law at (r, u)."""
         return self.frozen(r, u).regions(r, u, rho)
 
+    def stretched(self, u: Array, r: Array | None = None) -> Array:
+        """That of the inner law: friction moves nothing."""
+        return self.inner.stretched(u, r)
+
     def bound(self, r: Array) -> Array:
         """Largest |r_T| at r without slip, (nc,)."""
         return self.frozen(r, np.zeros_like(r)).bound(r)

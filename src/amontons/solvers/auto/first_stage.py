@@ -149,7 +149,8 @@ class Together:
             contacts, blocks = p.contacts, len(p.blocks.indices)
             before, full = ends[-1], _full(p).size
             ends.append((before[0] + contacts, before[1] + blocks, before[2] + full))
-            chunks = chunks_alone(p, self.tolerance)
+            brief = is_brief(p, self.tolerance)
+            chunks = FIRST_CHUNKS if brief else chunks_alone(p)
             limits.append(sweeps_of_first_chunks(blocks, contacts, chunks))
         self.sizes, self.limits = np.array(ends, np.int64), np.array(limits, np.int64)
         self.beyond = np.array(

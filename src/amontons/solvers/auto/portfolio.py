@@ -9,6 +9,7 @@ is measured in `benchmarks/results/race.md`.
     interior point      more reactions than balances: stacks, walls, arches of rigid blocks
     smoothing Newton    sliding stacks, the last digits
     deep Anderson       from the best reaction of all: the end of what momentum comes near to
+    steps and sweeps    Newton's steps and sweeps in turn from the best reaction: long plateaus
     inexact Newton      joints between deformable bodies
     semismooth Newton   where W is full (deformable bodies), or the law is not Coulomb's
     restarts            RESTARTS again and again, from the best reaction: proximal point;
@@ -29,6 +30,7 @@ from numpy.typing import NDArray
 
 from ...problem.friction import FrictionProblem
 from ..contract import Iterate, Iterates, Target
+from ..newton.alternating import SWEEPS
 from .race import CALL, FIRST_CHUNKS, SHORTEST, Entry, Race
 from .stages import (
     SEMISMOOTH_CONTACTS,
@@ -40,6 +42,7 @@ from .stages import (
 from .state import DENSE, State
 from .tracks import (
     LEAST,
+    alternating,
     anderson,
     inexact_newton,
     interior_point,
@@ -53,6 +56,7 @@ from .tracks import (
 
 Array = NDArray[np.float64]
 MOST_TURNS = 12  # repetitions of the restarts before Auto gives up
+STEPS_AND_SWEEPS = 10  # steps that Newton and sweeps in turn usually need
 DEEP_SWEEPS = 1000  # before which the others may end: it needs a reaction that is near
 
 
@@ -62,6 +66,10 @@ def _can_end(state: State) -> bool:
 
 def _has_cone(state: State) -> bool:
     return state.is_coulomb and _can_end(state)
+
+
+def _has_packing(state: State) -> bool:
+    return _has_cone(state) and state.joints is None and state.problem.blocks.density <= DENSE
 
 
 def _has_joints(state: State) -> bool:
@@ -105,6 +113,10 @@ def _deep_sweeps(state: State) -> float:
     return DEEP_SWEEPS * state.deep_cost
 
 
+def _alternations(state: State) -> float:
+    return STEPS_AND_SWEEPS * (state.alternation_cost + SWEEPS * state.sweep_cost)
+
+
 def _at_joints(state: State) -> float:
     assert state.joints is not None
     return 6 * state.joints.newton_cost(8)
@@ -136,6 +148,7 @@ TRACKS = (
     Entry("smoothing Newton", smoothing_newton, 0.15, 1.0, _steps(30), _has_cone, again=3.0,
           trial=_steps(30)),
     Entry("Anderson Gauss-Seidel, deep", polish, 0.1, 1.0, _deep_sweeps, _can_end, True),
+    Entry("Newton and sweeps", alternating, 0.1, 1.0, _alternations, _has_packing),
     Entry("inexact Newton", inexact_newton, 0.3, 0.3, _at_joints, _has_joints),
     Entry("semismooth Newton", semismooth_newton, 0.1, 1.0, _dense_steps, _has_steps),
     Entry("restarts", partial(staged, restarts), 0.2, 1.0, _steps(1000), _can_end, True),

@@ -60,7 +60,7 @@ GRACE = 1.2  # times the cost at which a track has promised the goal: its promis
 # Logarithm of the way to the goal, over that of the way to the best error, up to which that is
 # near; multiple of the best error at which it is taken to have been come by.
 NEAR, ALMOST = 1.5, 2.0
-TENTH = 10.0  # to which the error falls in a chunk, for what comes after the first
+LATER = 1 / 3  # of the digits that the first chunk gains, what the next ones do
 GROWTH = 0.2  # cost of a chunk, of what its track has cost
 CALL = 3e4  # nanoseconds that a chunk costs besides: Python, a judgement, bookkeeping
 SHORTEST = 6e4  # nanoseconds of a chunk at least, or the calls cost more than the sweeps
@@ -202,12 +202,12 @@ class Track:
     def soon(self) -> float:
         """Nanoseconds to the goal at the rate of the last chunk.
 
-        The first falls from afar, of which a tenth is what the next ones may be worth at most.
+        The first falls from afar: the next ones are taken to gain a part of its digits.
         """
         (before, higher), (cost, error) = self.path[-2:]
         if error <= self.state.goal:
             return 0.0
-        fall = higher / error if len(self.path) > 2 else min(higher / error, TENTH)
+        fall = higher / error if len(self.path) > 2 else (higher / error) ** LATER
         rest = math.log(error / self.state.goal) * (cost - before)
         return rest / math.log(fall) if fall > 1.0 else math.inf
 
@@ -301,12 +301,11 @@ class Race:
 
         A tighter goal that is sent counts from there on.
         """
-        tolerance, alone = self.state.target.tolerance, FIRST_CHUNKS
-        leader = self.tracks[0]
+        alone, leader = FIRST_CHUNKS, self.tracks[0]
         while leader in self.tracks and self._is_first(leader):
             yield from self._go_on(leader)
             if self.chunks == 1:
-                alone = chunks_alone(self.state.problem, tolerance)
+                alone = chunks_alone(self.state.problem)
                 if alone == 1:
                     yield from self._on_stacks(leader)
         if alone > 1:

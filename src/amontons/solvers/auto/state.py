@@ -35,6 +35,7 @@ HISTORY_CONTACT, DEEP_CONTACT = 35.0, 105.0
 MOMENTUM_CONTACT = 4.0
 PRODUCT = 5.4
 NEWTON_CONTACT = 500.0
+LINEARISED = 3e5  # of a step whose function and derivatives are not compiled, besides
 DENSE_STEP = 0.05  # per cube of the unknowns
 LIGHT = 1e6  # nanoseconds of a step up to which its cost is told without looking for faces
 DENSE = 0.5  # share of blocks of W above which it comes from a mesh
@@ -167,6 +168,11 @@ class State:
         return self.step_cost - PRODUCT * less
 
     @property
+    def alternation_cost(self) -> float:
+        """Nanoseconds of a Newton step in turn with sweeps, the calls about it included."""
+        return self.step_cost + LINEARISED
+
+    @property
     def dense_step_cost(self) -> float:
         """Nanoseconds of a Newton step that factorises the whole of W as a full matrix."""
         return DENSE_STEP * float(3 * self.problem.contacts) ** 3
@@ -253,6 +259,7 @@ class State:
         return Iterate(r[:, : self.problem.dimension].copy())
 
 
-def chunks_alone(problem: FrictionProblem, tolerance: float) -> int:
+def chunks_alone(problem: FrictionProblem) -> int:
     """Chunks that the first track has before any other, whatever it promises."""
-    return 1 if not is_brief(problem, tolerance) and is_stacked(problem) else FIRST_CHUNKS
+    short = _is_short(len(problem.blocks.indices), problem.contacts)
+    return 1 if not short and is_stacked(problem) else FIRST_CHUNKS

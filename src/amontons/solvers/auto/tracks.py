@@ -17,6 +17,7 @@ from numpy.typing import NDArray
 from ...core.errors import SingularOperator
 from ...linear.blocks import spatial
 from ..contract import Breakdown, Iterate, Patience
+from ..newton.alternating import Alternation
 from ..newton.interior_point import InteriorPoint, Relaxation, sliding_speed
 from ..newton.line_search import FullStep
 from ..newton.semismooth import SemismoothNewton
@@ -174,6 +175,22 @@ def smoothing_newton(state: State) -> Chunks:
         first = False
 
 
+def alternating(state: State) -> Chunks:
+    """Newton's steps and sweeps in turn from the best reaction, again from a far better one.
+
+    From any better one where steps lead nowhere.
+    """
+    _ = yield Chunk(state.start, 0, 0.0)
+    while True:
+        way = Alternation(state.problem, state.r, state.error)
+        own = state.error
+        while not state.error < (0.99 if way.stalled else NEARER) * own:
+            count = way.advance(state.goal)
+            cost = way.steps * state.alternation_cost + count * state.sweep_cost
+            _ = yield Chunk(way.r, max(way.steps, 1), cost, error=way.error)
+            own = min(own, way.error)
+
+
 def inexact_newton(state: State) -> Chunks:
     """Steps between deformable bodies: full ones from the best reaction, then from the start.
 
@@ -227,6 +244,6 @@ def staged(stages: Staged, state: State) -> Chunks:
 
 
 __all__ = [
-    "anderson", "inexact_newton", "interior_point", "momentum", "polish", "relaxed",
-    "semismooth_newton", "smoothing_newton", "staged",
+    "alternating", "anderson", "inexact_newton", "interior_point", "momentum", "polish",
+    "relaxed", "semismooth_newton", "smoothing_newton", "staged",
 ]  # fmt: skip

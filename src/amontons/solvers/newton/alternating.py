@@ -1,0 +1,121 @@
+"""Newton's steps and sweeps in turn: the end of what sweeps alone only come near to.
+
+Where statuses are found what is left of the error sits in few modes that go through the whole
+packing, in which sweeps need ten thousands; a step of Newton's method has them at once.  Alone
+it is hardly ever taken whole: contacts that slide slowly turn with a small part of it, and
+others open or stick again.  These are what a few sweeps put right.  So a step
+
+    (A + B W + shift) dr = -F,   F of Alart and Curnier, A = dF/dr, B = dF/du,
+
+is judged by its error after some sweeps, in parts of its length until that is smaller.  The
+shift, in r's unit, is a proximal term that holds reactions where they are more than balances:
+smaller after whole steps, larger after short ones.  Where no part of a step with a larger and
+larger shift helps, as in a place that is no solution but near to be one, sweeps go on from
+there without asking for a smaller error.
+
+The idea is that of nonlinear preconditioning: X.-C. Cai, D. Keyes, SIAM J. Sci. Comput. 24
+(2002); the proximal term that of R. T. Rockafellar, SIAM J. Control Optim. 14 (1976).
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ...linear.block_kernels import velocity_of_rows_inplace
+from ...problem.friction import FrictionProblem
+from ...problem.judge.measures import natural_error
+from ..sweeps.kernels import sweep_data, watch_for
+from ..sweeps.shared import sweeps
+from .block_lu import Symbolic, newton_step_inplace
+from .functions import AlartCurnier
+
+Array = NDArray[np.float64]
+SWEEPS = 100  # after a part of a step, before it is judged
+PARTS = (1.0, 0.25, 0.0625, 0.015625)  # of a step, tried in this order
+FIRST_SHIFT, LEAST_SHIFT, MOST_SHIFT = 1e-5, 1e-10, 1e-2  # relative to rho W_ii, about 1
+SOFTER, STIFFER, MUCH_STIFFER = 0.1, 3.0, 10.0  # after a whole step, a short one, none
+TRUSTED = 1e-4  # relative residual of a step up to which its factor is believed
+FAILURES = 4  # steps without a part that helps, after which sweeps go on alone
+STALLED, LESS = 8, 0.7  # so many steps without a part of the error do the same
+WANDERED = 10  # times as many sweeps then
+
+
+@dataclass(eq=False)
+class Alternation:
+    """Where steps and sweeps have come to: r (nc, 3) and its error, unit of u."""
+
+    problem: FrictionProblem
+    r: Array
+    error: float
+    shift: float = FIRST_SHIFT
+    failures: int = 0
+    steps: int = 0  # of Newton in the last advance: 0 or 1
+
+    def __post_init__(self) -> None:
+        self.data = sweep_data(self.problem)
+        self.mark, self.since = self.error, 0  # error when that last fell, steps since
+        self.symbols = Symbolic.of(self.problem).arrays
+
+    @property
+    def stalled(self) -> bool:
+        """True where steps lead nowhere, and sweeps go on alone next."""
+        return self.since >= STALLED or self.failures >= FAILURES
+
+    def advance(self, goal: float) -> int:
+        """One step, in the part that helps; the sweeps that it took.  goal: unit of u."""
+        self.steps = 0 if self.stalled else 1
+        if self.stalled:
+            return self._wander(goal)
+        self.since += 1
+        step = self._step()
+        done, helped = (0, False) if step is None else self._along(step, goal)
+        if not helped:
+            self.shift = min(MUCH_STIFFER * self.shift, MOST_SHIFT)
+            self.failures += 1
+        return done
+
+    def _along(self, step: Array, goal: float) -> tuple[int, bool]:
+        """Sweeps made from parts of a step, and whether one of them helps, which is taken."""
+        done = 0
+        for part in PARTS:
+            trial = self.r + part * step
+            done += sweeps(self.data, trial, SWEEPS, watch_for(goal))
+            error = self._judge(trial)
+            if not error < self.error:
+                continue
+            self.r, self.error, self.failures = trial, error, 0
+            if error < LESS * self.mark:
+                self.mark, self.since = error, 0
+            if part == 1.0:
+                self.shift = max(SOFTER * self.shift, LEAST_SHIFT)
+            elif part < PARTS[1]:
+                self.shift = min(STIFFER * self.shift, MOST_SHIFT)
+            return done, True
+        return done, False
+
+    def _wander(self, goal: float) -> int:
+        """Sweeps without asking for a smaller error."""
+        trial = self.r.copy()
+        done = sweeps(self.data, trial, WANDERED * SWEEPS, watch_for(goal))
+        self.r, self.error = trial, self._judge(trial)
+        self.mark, self.since, self.failures, self.shift = self.error, 0, 0, FIRST_SHIFT
+        return done
+
+    def _judge(self, r: Array) -> float:
+        error = natural_error(*self.problem.product_data, r)
+        return error if math.isfinite(error) else math.inf
+
+    def _step(self) -> Array | None:
+        """dr (nc, 3), or None where the factor is not to be believed."""
+        indptr, indices, data, q, _, _, rho = self.problem.kernel_data
+        u, dr = np.empty_like(self.r), np.empty_like(self.r)
+        velocity_of_rows_inplace(0, len(q), indptr, indices, data, q, self.r, u)
+        F, A, B = AlartCurnier().linearise(self.r, u, self.problem.law, rho)
+        A += self.shift * np.eye(3)
+        with np.errstate(all="ignore"):
+            residual = newton_step_inplace(indptr, indices, data, A, B, F, *self.symbols, dr)
+        return dr if residual <= TRUSTED and np.isfinite(dr).all() else None
