@@ -15,9 +15,9 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import sparse
 
-from ..core.compiled import njit
 from .aggregation import MISSED, OMEGA, STEPS, strong_graph
 from .borders import Borders, Rows, rows_of_ghosts, starts_of
+from .spread_loops import add, add_blocks, restrict, smooth, triple, units_of_rows
 from .spread_rows import SpreadRows
 
 Array = NDArray[np.float64]
@@ -58,7 +58,7 @@ class SpreadTransfer:
     def restrict(self, fine: Array) -> Array:
         """P' of values at own nodes (own, 3), at own units (own units w,)."""
         out = np.zeros((self.seen, self.width))
-        _restrict(self.rows.own, self.pointers, self.units, self.blocks, fine, out)
+        restrict(self.rows.own, self.pointers, self.units, self.blocks, fine, out)
         self.borders.give(out)
         return out[: self.own].reshape(-1)
 
@@ -67,7 +67,7 @@ class SpreadTransfer:
         x = np.zeros((self.seen, self.width))
         x[: self.own] = coarse.reshape(-1, self.width)
         self.borders.fetch(x)
-        _add(self.rows.own, self.pointers, self.units, self.blocks, x, fine)
+        add(self.rows.own, self.pointers, self.units, self.blocks, x, fine)
 
     def destroy(self) -> None:
         """Give the memory back; all processes have to."""
@@ -167,10 +167,10 @@ def _smoothed(rows: SpreadRows, T: Array, whose: Index, omega: float) -> Rows:
     t = rows.tiles
     known, unit = np.unique(whose, return_inverse=True)
     unit = unit.astype(np.int64) - (known[0] < 0)
-    pointers = _units_of_rows(t.indptr, t.indices, unit, len(known))
+    pointers = units_of_rows(t.indptr, t.indices, unit, len(known))
     units = np.empty(pointers[-1], dtype=np.int32)
     blocks = np.zeros((pointers[-1], 3, T.shape[2]))
-    _smooth(t.indptr, t.indices, t.data, t.inverse, T, unit, omega, len(known), pointers,
+    smooth(t.indptr, t.indices, t.data, t.inverse, T, unit, omega, len(known), pointers,
             units, blocks)  # fmt: skip
     return Rows(pointers, known[known >= 0][units], blocks)
 
@@ -186,7 +186,8 @@ class CoarseProduct:
         mine = _pattern(P, nodes, indptr, indices)
         entries = mine.tocoo()
         theirs = _sent(P, Rows(mine.indptr, P.numbers[mine.indices], np.zeros(mine.nnz)))
-        self.known = np.unique(np.concatenate([P.numbers, *(rows.columns for _, rows in theirs)]))
+        numbers = [P.numbers, *(rows.columns for _, rows in theirs)]
+        self.known = np.unique(np.concatenate(numbers))
         self.column = np.searchsorted(self.known, P.numbers).astype(np.int32)
         where = [(entries.coords[0], self.column[entries.coords[1]])]
         where += [(self._rows(*part), self._columns(part[1])) for part in theirs]
@@ -207,12 +208,12 @@ class CoarseProduct:
         P, pattern = self.P, self.pattern
         pointers, width = pattern.indptr, P.width
         values = np.zeros((pattern.nnz, width, width))
-        _triple(self.nodes, self.indptr, self.indices, data, P.pointers, P.units, P.blocks,
+        triple(self.nodes, self.indptr, self.indices, data, P.pointers, P.units, P.blocks,
                 self.column[P.units], len(self.known), pointers, pattern.indices,
                 values)  # fmt: skip
         columns = self.known[pattern.indices]
         for numbers, rows in _sent(P, Rows(pointers, columns, values)):
-            _add_blocks(self._rows(numbers, rows), self._columns(rows), rows.blocks, pointers,
+            add_blocks(self._rows(numbers, rows), self._columns(rows), rows.blocks, pointers,
                         pattern.indices, values)  # fmt: skip
         end = pointers[P.own]
         shape = width * P.own, width * int(P.starts[-1])
@@ -260,144 +261,3 @@ def let_lone_rest(comm: Any, rows: sparse.bsr_array, first: int) -> None:
     most = max(comm.allgather(float(own.max(initial=0.0)))) or 1.0
     lacking = np.where(own <= LONE * most, most, 0.0)
     rows.data[diagonal] += np.eye(rows.data.shape[1]) * lacking[:, None, :]
-
-
-@njit(cache=True, error_model="numpy")
-def _units_of_rows(indptr, indices, unit, units):
-    """Pointers: how many units the nodes of a row belong to."""
-    n = len(indptr) - 1
-    mark = np.full(units, -1, np.int64)
-    out = np.zeros(n + 1, np.int64)
-    for i in range(n):
-        count = 0
-        for k in range(indptr[i], indptr[i + 1]):
-            u = unit[indices[k]]
-            if u >= 0 and mark[u] != i:
-                mark[u] = i
-                count += 1
-        out[i + 1] = out[i] + count
-    return out
-
-
-@njit(cache=True, error_model="numpy")
-def _smooth(indptr, indices, data, inverse, T, unit, omega, units, pointers, out, blocks):  # noqa: PLR0913
-    """Rows of T - omega D^-1 A T, units in the order in which they come."""
-    width = T.shape[2]
-    slot = np.full(units, -1, np.int64)
-    for i in range(len(indptr) - 1):
-        first = used = pointers[i]
-        for k in range(indptr[i], indptr[i + 1]):
-            j = indices[k]
-            u = unit[j]
-            if u < 0:
-                continue
-            s = slot[u]
-            if s < first or s >= used or out[s] != u:
-                s = used
-                slot[u] = s
-                out[s] = u
-                used += 1
-            for a in range(3):
-                for c in range(3):
-                    factor = data[k, a, c]
-                    for b in range(width):
-                        blocks[s, a, b] += factor * T[j, c, b]
-        for s in range(first, used):
-            for b in range(width):
-                x, y, z = blocks[s, 0, b], blocks[s, 1, b], blocks[s, 2, b]
-                for a in range(3):
-                    blocks[s, a, b] = -omega * (
-                        inverse[i, a, 0] * x + inverse[i, a, 1] * y + inverse[i, a, 2] * z
-                    )
-        if unit[i] >= 0:
-            s = slot[unit[i]]
-            for a in range(3):
-                for b in range(width):
-                    blocks[s, a, b] += T[i, a, b]
-
-
-@njit(cache=True, error_model="numpy")
-def _triple(nodes, indptr, indices, data, p_ptr, p_units, P, column, columns, c_ptr, c_idx, out):  # noqa: PLR0913
-    """out += P' A P of rows of nodes; p_units: rows of out, column: their units as columns."""
-    width = P.shape[2]
-    slot = np.full(columns, -1, np.int64)
-    most = 0
-    for i in range(len(nodes)):
-        count = 0
-        for k in range(indptr[i], indptr[i + 1]):
-            count += p_ptr[indices[k] + 1] - p_ptr[indices[k]]
-        most = max(most, count)
-    row = np.empty((most, 3, width))
-    found = np.empty(most, np.int64)
-    for i in range(len(nodes)):
-        used = 0
-        for k in range(indptr[i], indptr[i + 1]):
-            j = indices[k]
-            for t in range(p_ptr[j], p_ptr[j + 1]):
-                u = column[t]
-                s = slot[u]
-                if s < 0:
-                    s = used
-                    slot[u] = s
-                    found[s] = u
-                    used += 1
-                    row[s] = 0.0
-                for a in range(3):
-                    x, y, z = data[k, a, 0], data[k, a, 1], data[k, a, 2]
-                    for b in range(width):
-                        row[s, a, b] += x * P[t, 0, b] + y * P[t, 1, b] + z * P[t, 2, b]
-        for t in range(p_ptr[nodes[i]], p_ptr[nodes[i] + 1]):
-            first, last = c_ptr[p_units[t]], c_ptr[p_units[t] + 1]
-            for s in range(used):
-                at = _place(c_idx, first, last, found[s])
-                for a in range(width):
-                    x, y, z = P[t, 0, a], P[t, 1, a], P[t, 2, a]
-                    for b in range(width):
-                        out[at, a, b] += x * row[s, 0, b] + y * row[s, 1, b] + z * row[s, 2, b]
-        for s in range(used):
-            slot[found[s]] = -1
-
-
-@njit(cache=True, error_model="numpy", inline="always")
-def _place(ascending, first, last, wanted):
-    """Where `wanted` stands in ascending[first:last]."""
-    while last - first > 1:
-        middle = (first + last) // 2
-        if ascending[middle] <= wanted:
-            first = middle
-        else:
-            last = middle
-    return first
-
-
-@njit(cache=True, error_model="numpy")
-def _add_blocks(row, column, blocks, c_ptr, c_idx, out):  # noqa: PLR0913
-    """Add blocks (k, w, w) at rows and columns (k,)."""
-    for k in range(len(row)):
-        out[_place(c_idx, c_ptr[row[k]], c_ptr[row[k] + 1], column[k])] += blocks[k]
-
-
-@njit(cache=True, error_model="numpy", nogil=True)
-def _restrict(own, pointers, units, blocks, fine, out):  # noqa: PLR0913
-    """out += P' fine."""
-    width = blocks.shape[2]
-    for i in range(own):
-        x, y, z = fine[i, 0], fine[i, 1], fine[i, 2]
-        for t in range(pointers[i], pointers[i + 1]):
-            u = units[t]
-            for b in range(width):
-                out[u, b] += blocks[t, 0, b] * x + blocks[t, 1, b] * y + blocks[t, 2, b] * z
-
-
-@njit(cache=True, error_model="numpy", nogil=True)
-def _add(own, pointers, units, blocks, coarse, fine):  # noqa: PLR0913
-    """fine += P coarse."""
-    width = blocks.shape[2]
-    for i in range(own):
-        for t in range(pointers[i], pointers[i + 1]):
-            u = units[t]
-            for b in range(width):
-                x = coarse[u, b]
-                fine[i, 0] += blocks[t, 0, b] * x
-                fine[i, 1] += blocks[t, 1, b] * x
-                fine[i, 2] += blocks[t, 2, b] * x

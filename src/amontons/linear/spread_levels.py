@@ -18,6 +18,7 @@ from __future__ import annotations
 import ctypes
 from collections.abc import Iterator
 from contextlib import contextmanager
+from itertools import pairwise
 from typing import Any
 
 import numpy as np
@@ -117,6 +118,7 @@ class CoarseLevels:
         self.pc.setOperators(self.A)
         self._down: list[Any] = []
         self._coarse: list[Any] = []
+        self._changes: list[Any] = []  # of A and of those below, in patterns that stay
         if self.A.getSize()[0] <= DIRECT:
             self.pc.setType("redundant")
             self.pc.setUp()
@@ -140,20 +142,24 @@ class CoarseLevels:
 
     def add(self, rows: sparse.bsr_array) -> None:
         """Add own rows, within the pattern, to the matrix, and what they are to those below."""
-        change = spread_matrix(self.comm, rows, self.width)
+        changes = self._changes
+        if changes:
+            fill(changes[0], rows)
+            for P, (above, below) in zip(self._down, pairwise(changes), strict=True):
+                above.PtAP(P, result=below)
+        else:
+            changes.append(spread_matrix(self.comm, rows, self.width))
+            with chosen_products(self.comm, alone="scalable"):
+                for P in self._down:
+                    changes.append(changes[-1].PtAP(P))
         subset = petsc().Mat.Structure.SUBSET_NONZERO_PATTERN
-        self.A.axpy(1.0, change, subset)
+        for A, change in zip((self.A, *self._coarse), changes, strict=True):
+            A.axpy(1.0, change, subset)
         self.pc.setOperators(self.A)
-        with chosen_products(self.comm, alone="scalable"):
-            for P, A in zip(self._down, self._coarse, strict=True):
-                above, change = change, change.PtAP(P)
-                above.destroy()
-                A.axpy(1.0, change, subset)
-        change.destroy()
 
     def destroy(self) -> None:
         """Give the memory back; all processes have to."""
-        for part in (self.pc, self.A, self._x, self._b):
+        for part in (self.pc, self.A, self._x, self._b, *self._changes):
             part.destroy()
 
 
@@ -200,6 +206,15 @@ def spread_matrix(comm: Any, rows: sparse.bsr_array, d: int) -> Any:
     A.setType("aij")
     A.setPreallocationNNZ(counts)
     A.setOption(PETSc.Mat.Option.USE_INODES, False)  # which take longer in blocks of 6
+    fill(A, rows)
+    return A
+
+
+def fill(A: Any, rows: sparse.bsr_array) -> None:
+    """Give a matrix of PETSc the entries of own rows (own, n), in the pattern that it has."""
+    PETSc = petsc()
+    d, (own, size) = A.getBlockSize(), rows.shape  # type: ignore[misc]  # scipy: may be None
+    last = A.getOwnershipRange()[1]
     step = max(1, SLAB * (own // d) // max(rows.data.size, 1))
     for first in range(0, own // d, step):
         ends = rows.indptr[first : first + step + 1]
@@ -213,7 +228,6 @@ def spread_matrix(comm: Any, rows: sparse.bsr_array, d: int) -> Any:
             rowmap=numbers.astype(PETSc.IntType),
         )  # fmt: skip
     A.assemble()
-    return A
 
 
 def _forget_product(A: Any) -> None:

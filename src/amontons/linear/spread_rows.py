@@ -2,8 +2,9 @@
 
 Rows and columns are nodes with three unknowns, as in `node_blocks`, whose kernels work on them;
 a node in 2D has an idle third one.  Columns have local numbers: own nodes first, then *ghosts*,
-nodes of other processes.  Sweeps of Gauss-Seidel leave ghosts as they were before, with the diagonal made larger at
-borders, so that the sweeps of all processes together do not diverge [BFKY].
+nodes of other processes.  Sweeps of Gauss-Seidel leave ghosts as they were before, with the
+diagonal made larger at borders, so that the sweeps of all processes together do not diverge
+[BFKY].
 
 [BFKY] A. Baker, R. Falgout, T. Kolev, U. Meier Yang, "Multigrid smoothers for ultraparallel
 computing", SIAM J. Sci. Comput. 33 (2011).

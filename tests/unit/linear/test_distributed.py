@@ -148,6 +148,9 @@ def test_a_part_has_all_cells_of_its_nodes():
     for number, expected in ((2, (table == 7).any(axis=1)), (0, (table != 7).any(axis=1))):
         part, nodes = cut.part(number)
         np.testing.assert_array_equal(nodes[part.cells[0].nodes], table[expected])
+        again = am.Mesh(part.points, part.cells)  # what is not checked twice holds
+        np.testing.assert_array_equal(again.cells[0].nodes, part.cells[0].nodes)
+        assert not part.points.flags.writeable and not part.surfaces and not part.levels
         np.testing.assert_array_equal(part.points, mesh.points[nodes])
     assert cut.part(1)[0] is None
 
