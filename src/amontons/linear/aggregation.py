@@ -152,7 +152,7 @@ def _strong(A: NodeBlocks, width: int) -> sparse.csr_array:
 
 
 def strong_graph(
-    row: Index, column: NDArray[np.integer], squares: Array, largest: Array
+    row: NDArray[np.integer], column: NDArray[np.integer], squares: Array, largest: Array
 ) -> sparse.csr_array:
     """The graph of units (units,) with couplings of squares (k,) that are not WEAK.
 

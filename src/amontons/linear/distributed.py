@@ -141,7 +141,7 @@ class SpreadMatrix:
     def _beside(self, marked: Mask) -> Index:
         """Own nodes in whose rows or columns a marked direction has an entry."""
         A = self.A
-        nodes = self._at_local(marked).reshape(-1, self.d).any(axis=1)
+        nodes = np.asarray(self._at_local(marked).reshape(-1, self.d).any(axis=1))
         near = np.logical_or.reduceat(nodes[A.tiles.indices], A.tiles.indptr[:-1])
         return np.flatnonzero(near)  # symmetric: who is in my rows has me in its own
 

@@ -171,7 +171,7 @@ def _smoothed(rows: SpreadRows, T: Array, whose: Index, omega: float) -> Rows:
     units = np.empty(pointers[-1], dtype=np.int32)
     blocks = np.zeros((pointers[-1], 3, T.shape[2]))
     smooth(t.indptr, t.indices, t.data, t.inverse, T, unit, omega, len(known), pointers,
-            units, blocks)  # fmt: skip
+           units, blocks)  # fmt: skip
     return Rows(pointers, known[known >= 0][units], blocks)
 
 
@@ -182,7 +182,8 @@ class CoarseProduct:
     """
 
     def __init__(self, P: SpreadTransfer, nodes: Index, indptr: Index, indices: Index) -> None:
-        self.P, self.nodes, self.indptr, self.indices = P, nodes, indptr, indices
+        self.P, self.nodes = P, nodes
+        self.indptr, self.indices = indptr.astype(np.int64), indices
         mine = _pattern(P, nodes, indptr, indices)
         entries = mine.tocoo()
         theirs = _sent(P, Rows(mine.indptr, P.numbers[mine.indices], np.zeros(mine.nnz)))
@@ -194,8 +195,10 @@ class CoarseProduct:
         row, column = (np.concatenate(part) for part in zip(*where, strict=True))
         ones = np.ones(len(row), dtype=np.float32)
         shape = len(P.numbers), len(self.known)
-        self.pattern = sparse.coo_array((ones, (row, column)), shape=shape).tocsr()
-        self.pattern.sort_indices()
+        pattern = sparse.coo_array((ones, (row, column)), shape=shape).tocsr()
+        pattern.sort_indices()
+        self.pointers = pattern.indptr.astype(np.int64)  # of one type, for compiled loops
+        self.columns = pattern.indices.astype(np.int32)
 
     def _rows(self, numbers: Index, rows: Rows) -> Index:
         return np.repeat(numbers - self.P.starts[self.P.rows.comm.rank], np.diff(rows.pointers))
@@ -205,16 +208,15 @@ class CoarseProduct:
 
     def of(self, data: Array) -> sparse.bsr_array:
         """Own rows (own units w, n), columns in the numbers of all units; data (nnz, 3, 3)."""
-        P, pattern = self.P, self.pattern
-        pointers, width = pattern.indptr, P.width
-        values = np.zeros((pattern.nnz, width, width))
+        P, pointers, width = self.P, self.pointers, self.P.width
+        values = np.zeros((len(self.columns), width, width))
         triple(self.nodes, self.indptr, self.indices, data, P.pointers, P.units, P.blocks,
-                self.column[P.units], len(self.known), pointers, pattern.indices,
-                values)  # fmt: skip
-        columns = self.known[pattern.indices]
+               self.column[P.units], len(self.known), pointers, self.columns,
+               values)  # fmt: skip
+        columns = self.known[self.columns]
         for numbers, rows in _sent(P, Rows(pointers, columns, values)):
             add_blocks(self._rows(numbers, rows), self._columns(rows), rows.blocks, pointers,
-                        pattern.indices, values)  # fmt: skip
+                       self.columns, values)  # fmt: skip
         end = pointers[P.own]
         shape = width * P.own, width * int(P.starts[-1])
         own = values[:end], columns[:end], pointers[: P.own + 1]

@@ -144,7 +144,7 @@ class SpreadRows:
 
     def numbers(self) -> Index:
         """The numbers of local nodes in those of all, (local,)."""
-        first = self.starts[self.comm.rank]
+        first = int(self.starts[self.comm.rank])
         return np.concatenate([np.arange(first, first + self.own), self.ghosts])
 
     def whole(self) -> sparse.bsr_array:

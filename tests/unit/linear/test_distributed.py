@@ -339,6 +339,33 @@ assert min(numbers)[0] > 10 and min(numbers)[1] > 1, numbers
 print("fine", flush=True)
 """
 
+ROWS = """
+import numpy as np, amontons as am
+from mpi4py import MPI
+from amontons.linear.spread_rows import SpreadRows
+from amontons.mechanics.elements.elasticity import stiffness
+comm = MPI.COMM_WORLD
+for d in (2, 3):
+    mesh = am.box((4, 1, 1)[:d], cells=(8, 2, 2)[:d])
+    K = stiffness(mesh, am.LinearElastic(young=1, poisson=0.45)).tocsr()
+    K.setdiag(1.001 * K.diagonal())
+    n = len(mesh.points)
+    ends = d * np.array([0, n // 3, n])[[comm.rank, comm.rank + 1]]
+    A = SpreadRows(comm, K[slice(*ends)].tobsr((d, d)), d)
+    assert len(A.ghosts) and abs(A.whole().toarray() - K[slice(*ends)].toarray()).max() == 0
+    x = np.random.default_rng(0).standard_normal(d * n)  # the same everywhere
+    assert abs(A.times(x[slice(*ends)]) - (K @ x)[slice(*ends)]).max() < 1e-13
+    mine, b, energies = A.vector(), np.zeros((A.own, 3)), []
+    A.put(x[slice(*ends)], mine)
+    for step in range(6):  # with b = 0 no sweep may add energy
+        y = A.taken(mine)
+        energies.append(comm.allreduce(float(y @ A.times(y))))
+        A.borders.fetch(mine)
+        A.sweep(b, mine, backward=bool(step % 2))
+    assert (np.diff(energies) < 0).all(), energies
+print("fine", flush=True)
+"""
+
 
 @pytest.fixture
 def on_two():
@@ -407,6 +434,12 @@ def test_an_error_reaches_both_and_parts_without_contacts_solve(on_two):
     assert done.returncode == 0, done.stderr
     assert done.stdout.count("no such mesh") == 2
     assert done.stdout.count("solved") == 4
+
+
+def test_rows_of_two_processes_make_one_matrix_and_their_sweeps_add_no_energy(on_two):
+    done = on_two("-c", ROWS)
+    assert done.returncode == 0, done.stderr
+    assert done.stdout.count("fine") == 2
 
 
 def test_coarse_matrices_follow_the_contacts(on_two):

@@ -12,7 +12,6 @@ from ...core.errors import InvalidInput, number_hint, shown
 from .timing import steady_value
 
 Array = NDArray[np.float64]
-FLOATS = (float, np.float64)
 Component = float | Callable[..., float] | None
 Vector = Sequence[float | None] | Array
 VectorValue = float | Sequence[Component] | Callable[..., Vector]
@@ -179,7 +178,7 @@ def _number(entry: object, what: str, free: bool) -> float:
         raise InvalidInput(
             f"{what}: expected numbers, got None (only supports leave components free)"
         )
-    if type(entry) not in FLOATS:  # what most functions return: no need to look closer
+    if not isinstance(entry, float):  # what most functions return: no need to look closer
         return number(what, entry)
     if not abs(entry) <= LARGEST:
         raise InvalidInput(f"{what}: expected a finite number, got {entry}")
