@@ -14,6 +14,11 @@ import sys
 def give_back() -> None:
     """Let the C library return the pages that nothing lives on; nothing where it can not."""
     gc.collect()
+    trim()
+
+
+def trim() -> None:
+    """The same of what is free already."""
     if sys.platform == "linux":
         trim = getattr(ctypes.CDLL(None), "malloc_trim", None)  # glibc alone has it
         if trim is not None:

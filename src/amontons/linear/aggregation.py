@@ -148,7 +148,16 @@ def _ranked(A: NodeBlocks, squares: Array) -> Array:
 
 def _strong(A: NodeBlocks, width: int) -> sparse.csr_array:
     """The graph of units of `width` block rows with the couplings that are not WEAK."""
-    row, column, squares, largest = _couplings(A, width)
+    return strong_graph(*_couplings(A, width))
+
+
+def strong_graph(
+    row: NDArray[np.integer], column: NDArray[np.integer], squares: Array, largest: Array
+) -> sparse.csr_array:
+    """The graph of units (units,) with couplings of squares (k,) that are not WEAK.
+
+    largest (units,): of the squares of each, but its own.
+    """
     strong = squares >= WEAK**2 * np.sqrt(largest[row] * largest[column])
     kept = (np.ones(np.count_nonzero(strong)), (row[strong], column[strong]))
     return sparse.csr_array(sparse.coo_array(kept, shape=(len(largest),) * 2))

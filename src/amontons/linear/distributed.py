@@ -11,10 +11,12 @@ j the directions of the same node, and a FAINT part of diag K_DD where a support
 has the same pattern at all times, and is symmetric unless contacts slide.  What A has lost
 stands in the rows `touched` (k, n), a thin matrix with the rows that have an entry in the row
 or column of a direction that may ever be held: K x is A x with these rows taken from there.
+A is stored once, as own block rows (`spread_rows`); PETSc has a copy only where another
+preconditioner of its own is asked for.
 
-Flexible GMRES is preconditioned from the right by multigrid (GAMG).  Its aggregates are made
-once.  Its coarse matrices follow (`spread_levels`), and are made anew only when an iteration
-gains far less than it did; another preconditioner also when many directions have changed.
+Flexible GMRES is preconditioned from the right by multigrid.  Its aggregates are made once.
+Its coarse matrices follow (`spread_levels`), and are made anew only when an iteration gains far
+less than it did; another preconditioner also when many directions have changed.
 
 Coarse functions are cut off at held directions, as in truncated multigrid [KK]: coarse matrices
 are P' A P with the FAINT diagonal in all of D, and what a cycle gives to D is dropped; with all
@@ -36,7 +38,8 @@ from scipy import sparse
 
 from ..core.errors import SingularOperator
 from .petsc import PREFIX, Petsc, petsc
-from .spread_levels import FollowingLevels, chosen_products
+from .spread_levels import SpreadCycle, chosen_products, give_modes, set_gamg, spread_matrix
+from .spread_rows import SpreadRows
 
 Array = NDArray[np.float64]
 Index = NDArray[np.int64]
@@ -44,15 +47,8 @@ Mask = NDArray[np.bool_]
 RESTART = 30  # vectors that GMRES keeps
 CHANGED = 0.2  # share of the contact directions that may change before multigrid follows
 WORSE = 3.0  # iterations per digit, compared with those of fresh coarse matrices
-SLAB = 2_000  # nodes whose rows are handed over at a time
 FAINT = 1e-6  # of the diagonal: keeps a coarse matrix regular whose functions are all cut off
 FIRST_WORSE = 8.0  # iterations per digit that are called bad whatever they were
-GAMG = {
-    "pc_gamg_reuse_interpolation": True,
-    # Directions that supports hold keep zeros.  With these as couplings two processes got a
-    # level of tetrahedra with 2e15 as its largest eigenvalue, not 1.8: no smoother at all.
-    "pc_gamg_threshold": 0.0,
-}
 
 
 @dataclass(frozen=True, eq=False)
@@ -83,28 +79,26 @@ class SpreadMatrix:
         self, comm: Any, rows: Callable[[], sparse.bsr_array], basis: sparse.bsr_array | None,
         *, modes: Array, d: int, fixed: Mask, contact: Mask, options: Petsc,
     ) -> None:  # fmt: skip
-        self.comm, self.d, self.options = comm, d, options
+        self.comm, self.d, self.options, self.modes = comm, d, options, modes
         self.own, self.directions = len(fixed), int(comm.allreduce(int(contact.sum())))
-        self.A = _matrix(comm, rows(), d)
-        self.T = None
-        if basis is not None:
-            self.T = _matrix(comm, basis, d)
-            plain, self.A = self.A, self.A.PtAP(self.T)
-            plain.destroy()
-            self.A.setBlockSize(d)
-        self.first, last = self.A.getOwnershipRange()
-        assert last - self.first == self.own
-        self.A.setOption(petsc().Mat.Option.KEEP_NONZERO_PATTERN, True)
-        self._x, self._y = self.A.createVecs()
-        self.A.getDiagonal(self._x)
-        self.diagonal = self._x.array_r.copy()
+        self.T = None if basis is None else spread_matrix(comm, basis, d)
+        own = rows() if self.T is None else _in_basis(comm, rows(), self.T, d)
+        self.A = SpreadRows(comm, own, d)
+        del own
+        size = (self.own, d * int(self.A.starts[-1]))
+        self.product = petsc().Mat().createPython((size, size), Product(self.A), comm=comm)
+        self.product.setUp()
+        self._x, self._y = self.product.createVecs()
+        if self.T is not None:
+            self.modes = np.stack([self.to_basis(v) for v in modes.T.copy()], axis=1)
+        self._take_rows(fixed | contact)
+        self.diagonal = self.A.diagonal()
         self._in_matrix = np.where(fixed, FAINT, 1.0) * self.diagonal
-        self._take_rows(fixed | contact, contact)
-        self._give_modes(modes)
+        self._changing = self._beside(contact)
         self.held = np.zeros(self.own, dtype=bool)
         self.ksp: Any = None
-        self.preconditioner: Any = None
-        self.levels: FollowingLevels | None = None
+        self.cycle: SpreadCycle | None = None
+        self.other: Any = None
         self._fresh = True
         self.iterations = self.rebuilt = 0
         self._built = np.zeros(self.own, dtype=bool)
@@ -112,8 +106,8 @@ class SpreadMatrix:
 
     def destroy(self) -> None:
         """Give the memory back; all processes have to, and have no use of this object then."""
-        for part in (self.levels, self.ksp, self.preconditioner, self.A, self.T, self.touched,
-                     self._fetch, self._near, self._x, self._y, self._rest):  # fmt: skip
+        for part in (self.cycle, self.ksp, self.other, self.product, self.A, self.T, self._x,
+                     self._y):  # fmt: skip
             if part is not None:
                 part.destroy()
 
@@ -144,101 +138,48 @@ class SpreadMatrix:
         return f if self.T is None else 2 * f - self.load_in_basis(f)
 
     # ------------------------------------------------------------------ set-up
-    def _take_rows(self, may_be_held: Mask, changing: Mask) -> None:
+    def _beside(self, marked: Mask) -> Index:
+        """Own nodes in whose rows or columns a marked direction has an entry."""
+        A = self.A
+        nodes = np.asarray(self._at_local(marked).reshape(-1, self.d).any(axis=1))
+        near = np.logical_or.reduceat(nodes[A.tiles.indices], A.tiles.indptr[:-1])
+        return np.flatnonzero(near)  # symmetric: who is in my rows has me in its own
+
+    def _take_rows(self, may_be_held: Mask) -> None:
         """Keep the rows that have an entry in the row or column of a marked direction."""
-        PETSc = petsc()
-        index = (self.first + np.flatnonzero(may_be_held)).astype(PETSc.IntType)
-        own = PETSc.IS().createStride(self.own, self.first, 1, comm=self.comm)
-        marked = self.A.createSubMatrix(PETSc.IS().createGeneral(index, comm=self.comm), own)
-        columns = np.unique(marked.getValuesCSR()[1])  # symmetric: the rows that touch it
-        marked.destroy()
-        flags = self.A.createVecRight()
-        flags.setValues(columns.astype(PETSc.IntType), np.ones(len(columns)))
-        flags.assemble()
-        touched = np.flatnonzero((flags.array_r > 0) | may_be_held)
-        rows = (self.first + touched).astype(PETSc.IntType)
-        self.touched = self.A.createSubMatrix(
-            PETSc.IS().createGeneral(rows, comm=self.comm), own
-        )
-        self.touched_rows = touched
-        self._rest = self.touched.createVecLeft()
-        pointers, columns, values = self.touched.getValuesCSR()
-        self._pattern = pointers, columns, values
-        self._of = np.repeat(touched.astype(np.int32), np.diff(pointers))
-        self._on_diagonal = columns == self.first + self._of
-        known, place = np.unique(columns, return_inverse=True)
-        self._place = place.ravel().astype(np.int32)
-        self._near = PETSc.Vec().createSeq(len(known))
-        self._fetch = PETSc.Scatter().create(
-            flags, PETSc.IS().createGeneral(known.astype(PETSc.IntType), comm=self.comm),
-            self._near, None,
-        )  # fmt: skip
-        flags.destroy()
-        self._find_changing(changing)
+        inside = np.arange(self.d)
+        rows = (self._beside(may_be_held)[:, None] * self.d + inside).ravel()
+        pointers, columns, self._places = self.A.slots(rows)
+        values = self.A.tiles.data.reshape(-1)[self._places]
+        self.touched_rows, self._pattern = rows, (pointers, columns, values)
+        self._of = np.repeat(rows.astype(np.int32), np.diff(pointers))
+        self._on_diagonal = columns == self._of
+        shape = len(rows), self.d * self.A.local
+        self.touched = sparse.csr_array((values, columns, pointers), shape=shape)
 
-    def _find_changing(self, changing: Mask) -> None:
-        """Which of the touched rows have an entry in the row or column of such a direction."""
-        pointers, columns, _ = self._pattern
-        entries = self._fetched(changing)[self._place] | changing[self._of]
-        near = np.repeat(np.arange(len(self.touched_rows)), np.diff(pointers))[entries]
-        some = np.unique(near)
-        counts = np.diff(pointers)[some]
-        ends = np.concatenate([[0], np.cumsum(counts)])
-        slots = np.arange(ends[-1]) + np.repeat(pointers[some] - ends[:-1], counts)
-        self._changing = slots, (self.touched_rows[some], ends, columns[slots])
-
-    def _fetched(self, mine: Mask) -> Mask:
-        """A mask of own directions at the columns of the touched rows, of all processes."""
-        self._x.array = mine.astype(float)
-        self._fetch.scatter(self._x, self._near, mode=petsc().ScatterMode.FORWARD)
-        return self._near.array_r > 0
-
-    def _give_modes(self, modes: Array) -> None:
-        """Rigid motions in the basis, orthonormal, as PETSc asks for."""
-        PETSc = petsc()
-        kept: list[Any] = []
-        for column in modes.T:
-            v = self.A.createVecRight()
-            v.array = self.to_basis(np.ascontiguousarray(column))
-            size = v.norm()
-            for _ in range(2):  # the second time takes off what rounding left
-                for other in kept:
-                    v.axpy(-v.dot(other), other)
-            if v.norm() > 1e-8 * size > 0:
-                v.normalize()
-                kept.append(v)
-        self.A.setNearNullSpace(PETSc.NullSpace().create(vectors=kept, comm=self.comm))
+    def _at_local(self, mine: Mask) -> Mask:
+        """A mask of own directions with those of ghosts behind, (local d,)."""
+        return self.A.at_local(mine.astype(float)) > 0
 
     def blocks(self, dofs: Index) -> Array:
         """K in the blocks of own unknowns dofs (k, d) that may be held, (k, d, d)."""
         if not len(dofs):
             return np.zeros((0, self.d, self.d))
-        pointers, columns, values = self._pattern
-        shape = (len(self.touched_rows), self.A.getSize()[1])
-        rows = sparse.csr_array((values, columns, pointers), shape=shape)
         at = np.searchsorted(self.touched_rows, dofs)
         d = dofs.shape[1]
-        i, j = np.repeat(at, d, axis=1).ravel(), np.tile(dofs + self.first, (1, d)).ravel()
-        return np.asarray(rows[i, j]).reshape(len(dofs), d, d)
+        i, j = np.repeat(at, d, axis=1).ravel(), np.tile(dofs, (1, d)).ravel()
+        return np.asarray(self.touched[i, j]).reshape(len(dofs), d, d)
 
     def hold(self, held: Mask, sliding: Sliding) -> None:
         """Hold own directions (own,), and let contacts slide by their conditions."""
-        PETSc = petsc()
-        pointers, columns, values = self._pattern
-        free = np.where(self._fetched(held)[self._place], 0.0, values)  # columns
+        _, columns, values = self._pattern
+        free = np.where(self._at_local(held)[columns], 0.0, values)
         values = np.where(held[self._of], 0.0, free)
         mine = self._on_diagonal & held[self._of]
         values[mine] = self._in_matrix[self._of[mine]]
         self.held = held
         self._let_slide(values, free, sliding)
-        index = (self.first + self.touched_rows).astype(PETSc.IntType)
-        if len(index):
-            self.A.setValuesIJV(pointers, columns, values, rowmap=index)
-        self.A.assemble()
-        slots = self._changing[0]
-        self._values = values[slots]
-        faint = FAINT * self.diagonal[self._of[slots]]
-        self._below = np.where(mine[slots], faint, self._values)
+        self.A.write(self._places, values, self.touched_rows[:: self.d] // self.d)
         self._changed = float(self.total(int((held != self._built).sum())))
 
     def _let_slide(self, values: Array, free: Array, sliding: Sliding) -> None:
@@ -253,7 +194,7 @@ class SpreadMatrix:
         count = pointers[1 + np.searchsorted(self.touched_rows, rows[:, 0])] - starts[:, 0]
         of = np.repeat(np.arange(len(rows)), count)
         entry = starts[of].T + np.arange(len(of)) - np.repeat(np.cumsum(count) - count, count)
-        beside = columns[entry[0]] - self.first - rows[of, 0]  # direction of the same node
+        beside = columns[entry[0]] - rows[of, 0]  # direction of the same node
         own = np.flatnonzero((beside >= 0) & (beside < d))
         G_u = np.where(self.held[rows][:, None, :], 0.0, sliding.G_u)
         for a in range(d):
@@ -265,9 +206,8 @@ class SpreadMatrix:
     # ------------------------------------------------------------------ products
     def times(self, x: Array) -> Array:
         """K x of own values (own,), held directions included."""
-        out = self._product(self.A.mult, x)
-        self.touched.mult(self._x, self._rest)
-        out[self.touched_rows] = self._rest.array_r
+        out = self.A.times(x)
+        out[self.touched_rows] = self.touched @ self.A.at_local(x)
         return out
 
     # ------------------------------------------------------------------ solving
@@ -300,31 +240,53 @@ class SpreadMatrix:
     def _prepare(self) -> None:
         """Make the solver, or let multigrid follow the matrix, anew where it is time to."""
         if self.ksp is None:
-            self.preconditioner = preconditioner(self.A)
-            self.ksp = krylov_of_steps(self.A, OfFree(self))
+            self.ksp = krylov_of_steps(self.product, OfFree(self))
             self._fresh = True
         else:
-            many = self.levels is None and self._changed > CHANGED * self.directions
+            many = self.cycle is None and self._changed > CHANGED * self.directions
             self._fresh = many or self._stale
-            self.preconditioner.setReusePreconditioner(not self._fresh)
-            self.preconditioner.setOperators(self.A)
-            self.ksp.setOperators(self.A)
         if self._fresh:
             self._make_levels()
-        if self.levels is not None:
-            self.levels.follow(self._below)
+        if self.cycle is not None:
+            self.cycle.follow(self._below())
 
     def _make_levels(self) -> None:
         """Multigrid of the matrix as it is now, or what else the preconditioner is."""
         self.rebuilt += 1
         self._built = self.held.copy()
-        if self.levels is not None:
-            self.levels.destroy()
-        pc = self.preconditioner
-        with chosen_products(self.comm):
-            pc.setUp()
-        if pc.getType() == "gamg":
-            self.levels = FollowingLevels(pc, self.A, *self._changing[1], self._values)
+        for part in (self.cycle, self.other):
+            if part is not None:
+                part.destroy()
+        self.cycle = self.other = None
+        if petsc().Options().getString(PREFIX + "pc_type", "gamg") == "gamg":
+            self.cycle = SpreadCycle(self.A, self.modes, self._changing)
+        else:
+            self.other = preconditioner(self.A, self.modes)
+
+    def _below(self) -> Array:
+        """Blocks of what coarse matrices are made of, in rows that contacts change."""
+        assert self.cycle is not None
+        t, at = self.A.tiles, self.cycle.blocks
+        blocks = t.data[at]
+        nodes = self._changing
+        row = np.repeat(nodes, np.diff(t.indptr)[nodes])
+        own = np.flatnonzero(t.indices[at] == row)  # one a node, in the order of nodes
+        held = self.held.reshape(-1, self.d)[nodes]
+        faint = FAINT * self.diagonal.reshape(-1, self.d)[nodes]
+        for k in range(self.d):
+            blocks[own[held[:, k]], k, k] = faint[held[:, k], k]
+        return blocks
+
+
+class Product:
+    """The matrix as PETSc's Krylov methods call it."""
+
+    def __init__(self, rows: SpreadRows) -> None:
+        self.rows = rows
+
+    def mult(self, _: Any, x: Any, y: Any) -> None:
+        """Put A x into y."""
+        y.array = self.rows.times(x.array_r)
 
 
 class OfFree:
@@ -335,22 +297,23 @@ class OfFree:
 
     def apply(self, _: Any, x: Any, y: Any) -> None:
         """Put the preconditioner of x into y."""
-        self.matrix.preconditioner.apply(x, y)
+        if self.matrix.cycle is not None:
+            y.array = self.matrix.cycle.apply(x.array_r)
+        else:
+            self.matrix.other.apply(x, y)
         y.array[self.matrix.held] = 0.0
 
 
-def preconditioner(A: Any) -> Any:
-    """Multigrid whose aggregates are kept, or what else the options ask for; not yet set up."""
-    PETSc = petsc()
-    options = PETSc.Options()
-    for name, value in GAMG.items():
-        if not options.hasName(PREFIX + name):
-            options.setValue(PREFIX + name, value)
-    pc = PETSc.PC().create(A.getComm())
+def preconditioner(rows: SpreadRows, modes: Array) -> Any:
+    """One of PETSc that the options ask for instead of multigrid, of a copy of the matrix."""
+    A = spread_matrix(rows.comm, rows.whole(), rows.d)
+    give_modes(A, modes)
+    pc = petsc().PC().create(rows.comm)
     pc.setOperators(A)
-    pc.setType("gamg")
-    pc.setOptionsPrefix(PREFIX)
-    pc.setFromOptions()
+    set_gamg(pc)
+    with chosen_products(rows.comm):
+        pc.setUp()
+    A.destroy()  # the preconditioner has it
     return pc
 
 
@@ -370,31 +333,12 @@ def krylov_of_steps(A: Any, given: OfFree) -> Any:
     return ksp
 
 
-def _matrix(comm: Any, rows: sparse.bsr_array, d: int) -> Any:
-    """PETSc's matrix of the own rows (own, n) of all processes, filled slab by slab."""
-    PETSc = petsc()
-    own, size = rows.shape  # type: ignore[misc]  # scipy: may be None
-    last = comm.scan(own)
-    inside = (rows.indices >= (last - own) // d) & (rows.indices < last // d)
-    nodes = np.repeat(np.arange(own // d), np.diff(rows.indptr))
-    counts = [
-        np.repeat(d * np.bincount(nodes[some], minlength=own // d), d).astype(PETSc.IntType)
-        for some in (inside, ~inside)
-    ]
-    A = PETSc.Mat().create(comm)
-    A.setSizes(((own, size), (own, size)), bsize=d)
-    A.setType("aij")
-    A.setPreallocationNNZ(counts)
-    for first in range(0, own // d, SLAB):
-        ends = rows.indptr[first : first + SLAB + 1]
-        some = slice(ends[0], ends[-1])
-        parts = (rows.data[some], rows.indices[some], ends - ends[0])
-        slab = sparse.bsr_array(parts, shape=(d * (len(ends) - 1), size)).tocsr()
-        slab.sort_indices()
-        numbers = np.arange(last - own + d * first, last - own + d * first + slab.shape[0])
-        A.setValuesIJV(
-            slab.indptr.astype(PETSc.IntType), slab.indices.astype(PETSc.IntType), slab.data,
-            rowmap=numbers.astype(PETSc.IntType),
-        )  # fmt: skip
-    A.assemble()
-    return A
+def _in_basis(comm: Any, rows: sparse.bsr_array, T: Any, d: int) -> sparse.bsr_array:
+    """Own rows of T' K T, of K in the coordinates of nodes."""
+    K = spread_matrix(comm, rows, d)
+    A = K.PtAP(T)
+    pointers, columns, values = A.getValuesCSR()
+    shape = len(pointers) - 1, rows.shape[1]
+    for part in (K, A):
+        part.destroy()
+    return sparse.csr_array((values, columns, pointers), shape=shape).tobsr((d, d))

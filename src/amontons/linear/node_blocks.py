@@ -86,7 +86,7 @@ class NodeBlocks:
         own = np.einsum("kii->ki", self.diagonal_blocks)
         return bool(np.isfinite(self.inverse).all() and (own > 0).all())
 
-    def slots(self, node: Index) -> tuple[Index, Index]:
+    def slots(self, node: Integers) -> tuple[Index, Index]:
         """Places of the entries of rows (k,), row after row, and the ends of these (k + 1,)."""
         counts = np.diff(self.indptr)[node]
         ends = np.concatenate([[0], np.cumsum(counts)])

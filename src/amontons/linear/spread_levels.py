@@ -1,7 +1,11 @@
-"""Coarse matrices of PETSc's multigrid that follow the rows of contacts, not made anew.
+"""Multigrid for a spread matrix: one level of our own above PETSc's.
 
-The products P' A P of a whole matrix cost as much as some twenty cycles.  From one step of
-Newton's method to the next A changes near contacts alone, by dA, and so do its coarse matrices,
+The finest level is swept by Gauss-Seidel on the rows of each process, and coarsened by
+aggregates (`spread_aggregates`), which takes little memory; below it PETSc has a matrix A_1 of
+some twentieth of the unknowns, and GAMG for it.
+
+From one step of Newton's method to the next A changes near contacts alone, by dA, and so do
+the coarse matrices,
 
     A_1 += P_0' dA P_0,    A_2 += P_1' (P_0' dA P_0) P_1,    ...
 
@@ -14,65 +18,216 @@ from __future__ import annotations
 import ctypes
 from collections.abc import Iterator
 from contextlib import contextmanager
+from itertools import pairwise
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy import sparse
 
-from .petsc import petsc
+from ..core.memory import trim
+from .petsc import PREFIX, petsc
+from .spread_aggregates import (
+    CoarseProduct,
+    SpreadTransfer,
+    let_lone_rest,
+    transfer_to_aggregates,
+)
+from .spread_rows import SpreadRows
 
 Array = NDArray[np.float64]
-Index = NDArray[np.int64]
+Index = NDArray[np.integer]
 DENSE = 64  # processes at most that make rows of a product in a dense one
+SLAB = 200_000  # entries that are handed over at a time, some three times in memory
+DIRECT = 1_000  # unknowns of a coarse matrix that every process factors, at most
+GAMG = {
+    "pc_gamg_reuse_interpolation": True,
+    # Directions that supports hold keep zeros.  With these as couplings two processes got a
+    # level of tetrahedra with 2e15 as its largest eigenvalue, not 1.8: no smoother at all.
+    "pc_gamg_threshold": 0.0,
+}
 
 
-class FollowingLevels:
-    """Levels of GAMG below a matrix A whose rows `rows` change, and what A was when they were.
+class SpreadCycle:
+    """One V(1,1) cycle for a matrix as it is now, whose rows at `changing` nodes may change.
 
-    rows (k,): own numbers; pattern: CSR pointers (k + 1,) and PETSc's columns of these rows;
-    values: their entries in the A of which the levels are made.
+    modes (own d, w): near-null motions.
     """
 
-    def __init__(  # noqa: PLR0913  # a sparse matrix of few rows
-        self, pc: Any, A: Any, rows: Index, pointers: Index, columns: Index, values: Array
-    ) -> None:
-        PETSc = petsc()
-        first, last = A.getOwnershipRange()
-        counts = np.zeros(last - first + 1, dtype=PETSc.IntType)
-        counts[1 + rows] = np.diff(pointers)
-        self._csr = np.cumsum(counts, dtype=PETSc.IntType), columns.astype(PETSc.IntType)
-        self._values = values
-        self._change = PETSc.Mat().createAIJ(
-            A.getSizes(), bsize=A.getBlockSize(), csr=(*self._csr, np.zeros(len(values))),
-            comm=A.getComm(),
-        )  # fmt: skip
-        finest = pc.getMGLevels() - 1
-        self._down = [pc.getMGInterpolation(k) for k in range(finest, 0, -1)]
-        below = range(finest - 1, -1, -1)
-        self._coarse = [pc.getMGSmoother(k).getOperators()[0] for k in below]
-        self._products: list[Any] = [None] * finest
-        for coarse in self._coarse:
-            _forget_product(coarse)
-
-    def follow(self, values: Array) -> None:
-        """Let the levels be those of A with other entries in the rows."""
-        PETSc = petsc()
-        self._change.setValuesCSR(*self._csr, values - self._values)
-        self._change.assemble()
-        self._values = values
-        if not self._change.norm():
+    def __init__(self, rows: SpreadRows, modes: Array, changing: Index) -> None:
+        self.rows, self.P, self.below = rows, transfer_to_aggregates(rows, modes), None
+        self._x, self._b, self._r = rows.vector(), *np.zeros((2, rows.own, 3))
+        self.blocks, ends = rows.tiles.slots(changing)
+        if self.P is None:
             return
-        change, subset = self._change, PETSc.Mat.Structure.SUBSET_NONZERO_PATTERN
-        with chosen_products(change.getComm(), alone="scalable"):
-            for k, (P, A) in enumerate(zip(self._down, self._coarse, strict=True)):
-                change = self._products[k] = change.PtAP(P, self._products[k])
-                A.axpy(1.0, change, subset)
+        t = rows.tiles
+        self.change = CoarseProduct(self.P, changing, ends, t.indices[self.blocks])
+        self._data = t.data[self.blocks]
+        trim()
+        A = coarse_matrix(self.P)
+        trim()
+        self.below = CoarseLevels(A, self.P.modes)
+
+    def follow(self, data: Array) -> None:
+        """Let coarse levels be those of a matrix with other blocks (k, 3, 3) at `blocks`."""
+        if self.below is not None:
+            change, self._data = data - self._data, data
+            if self.rows.comm.allreduce(int(change.any())):
+                self.below.add(self.change.of(change))
+
+    def apply(self, b: Array) -> Array:
+        """What the cycle makes of own values (own d,), from zero."""
+        rows, x, right, r = self.rows, self._x, self._b, self._r
+        rows.put(b, right)
+        x[:] = 0.0
+        rows.sweep(right, x, backward=False)
+        if self.P is not None and self.below is not None:
+            rows.borders.fetch(x)
+            rows.residual(x, right, r)
+            self.P.add(self.below.apply(self.P.restrict(r)), x)
+        rows.borders.fetch(x)
+        rows.sweep(right, x, backward=True)
+        return rows.taken(x)
 
     def destroy(self) -> None:
         """Give the memory back; all processes have to."""
-        for part in (self._change, *self._products):
+        for part in (self.P, self.below):
             if part is not None:
                 part.destroy()
+
+
+def coarse_matrix(P: SpreadTransfer) -> Any:
+    """P' A P as a matrix of PETSc."""
+    t, comm = P.rows.tiles, P.rows.comm
+    rows = CoarseProduct(P, np.arange(P.rows.own), t.indptr, t.indices).of(t.data)
+    let_lone_rest(comm, rows, int(P.starts[comm.rank]))
+    return spread_matrix(comm, rows, P.width)
+
+
+class CoarseLevels:
+    """PETSc's solver of a coarse matrix, which follows its changes: GAMG, or factors.
+
+    modes (own, w): near-null motions, whose number is that of the unknowns of an aggregate.
+    """
+
+    def __init__(self, A: Any, modes: Array) -> None:
+        self.A, self.width, self.comm = A, modes.shape[1], A.getComm().tompi4py()
+        give_modes(A, modes)
+        self._x, self._b = self.A.createVecs()
+        self.pc = petsc().PC().create(self.comm)
+        self.pc.setOperators(self.A)
+        self._down: list[Any] = []
+        self._coarse: list[Any] = []
+        self._changes: list[Any] = []  # of A and of those below, in patterns that stay
+        if self.A.getSize()[0] <= DIRECT:
+            self.pc.setType("redundant")
+            self.pc.setUp()
+            return
+        set_gamg(self.pc)
+        with chosen_products(self.comm):
+            self.pc.setUp()
+        self.pc.setReusePreconditioner(True)
+        finest = self.pc.getMGLevels() - 1
+        self._down = [self.pc.getMGInterpolation(k) for k in range(finest, 0, -1)]
+        below = range(finest - 1, -1, -1)
+        self._coarse = [self.pc.getMGSmoother(k).getOperators()[0] for k in below]
+        for coarse in self._coarse:
+            _forget_product(coarse)
+
+    def apply(self, b: Array) -> Array:
+        """What one cycle makes of own values."""
+        self._b.array = b
+        self.pc.apply(self._b, self._x)
+        return self._x.array_r
+
+    def add(self, rows: sparse.bsr_array) -> None:
+        """Add own rows, within the pattern, to the matrix, and what they are to those below."""
+        changes = self._changes
+        if changes:
+            fill(changes[0], rows)
+            for P, (above, below) in zip(self._down, pairwise(changes), strict=True):
+                above.PtAP(P, result=below)
+        else:
+            changes.append(spread_matrix(self.comm, rows, self.width))
+            with chosen_products(self.comm, alone="scalable"):
+                for P in self._down:
+                    changes.append(changes[-1].PtAP(P))
+        subset = petsc().Mat.Structure.SUBSET_NONZERO_PATTERN
+        for A, change in zip((self.A, *self._coarse), changes, strict=True):
+            A.axpy(1.0, change, subset)
+        self.pc.setOperators(self.A)
+
+    def destroy(self) -> None:
+        """Give the memory back; all processes have to."""
+        for part in (self.pc, self.A, self._x, self._b, *self._changes):
+            part.destroy()
+
+
+def set_gamg(pc: Any) -> None:
+    """Multigrid whose aggregates are kept, or what else the options ask for; not yet set up."""
+    options = petsc().Options()
+    for name, value in GAMG.items():
+        if not options.hasName(PREFIX + name):
+            options.setValue(PREFIX + name, value)
+    pc.setType("gamg")
+    pc.setOptionsPrefix(PREFIX)
+    pc.setFromOptions()
+
+
+def give_modes(A: Any, modes: Array) -> None:
+    """Give a matrix its near-null motions (own, k), orthonormal, as PETSc asks for."""
+    kept: list[Any] = []
+    for column in modes.T:
+        v = A.createVecRight()
+        v.array = np.ascontiguousarray(column)
+        size = v.norm()
+        for _ in range(2):  # the second time takes off what rounding left
+            for other in kept:
+                v.axpy(-v.dot(other), other)
+        if v.norm() > 1e-8 * size > 0:
+            v.normalize()
+            kept.append(v)
+    A.setNearNullSpace(petsc().NullSpace().create(vectors=kept, comm=A.getComm()))
+
+
+def spread_matrix(comm: Any, rows: sparse.bsr_array, d: int) -> Any:
+    """PETSc's matrix of the own rows (own, n) of all processes, filled slab by slab."""
+    PETSc = petsc()
+    own, size = rows.shape  # type: ignore[misc]  # scipy: may be None
+    last = comm.scan(own)
+    inside = (rows.indices >= (last - own) // d) & (rows.indices < last // d)
+    nodes = np.repeat(np.arange(own // d), np.diff(rows.indptr))
+    counts = [
+        np.repeat(d * np.bincount(nodes[some], minlength=own // d), d).astype(PETSc.IntType)
+        for some in (inside, ~inside)
+    ]
+    A = PETSc.Mat().create(comm)
+    A.setSizes(((own, size), (own, size)), bsize=d)
+    A.setType("aij")
+    A.setPreallocationNNZ(counts)
+    A.setOption(PETSc.Mat.Option.USE_INODES, False)  # which take longer in blocks of 6
+    fill(A, rows)
+    return A
+
+
+def fill(A: Any, rows: sparse.bsr_array) -> None:
+    """Give a matrix of PETSc the entries of own rows (own, n), in the pattern that it has."""
+    PETSc = petsc()
+    d, (own, size) = A.getBlockSize(), rows.shape  # type: ignore[misc]  # scipy: may be None
+    last = A.getOwnershipRange()[1]
+    step = max(1, SLAB * (own // d) // max(rows.data.size, 1))
+    for first in range(0, own // d, step):
+        ends = rows.indptr[first : first + step + 1]
+        some = slice(ends[0], ends[-1])
+        parts = (rows.data[some], rows.indices[some], ends - ends[0])
+        slab = sparse.bsr_array(parts, shape=(d * (len(ends) - 1), size)).tocsr()
+        slab.sort_indices()
+        numbers = np.arange(last - own + d * first, last - own + d * first + slab.shape[0])
+        A.setValuesIJV(
+            slab.indptr.astype(PETSc.IntType), slab.indices.astype(PETSc.IntType), slab.data,
+            rowmap=numbers.astype(PETSc.IntType),
+        )  # fmt: skip
+    A.assemble()
 
 
 def _forget_product(A: Any) -> None:

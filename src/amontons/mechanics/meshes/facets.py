@@ -87,11 +87,12 @@ def sides(cells: tuple[Cells, ...], near: NDArray[np.bool_] | None = None) -> di
     """
     found: dict[int, list[Index]] = {}
     for block in cells:
+        marked = None if near is None else near[block.nodes]
         for side in CELLS[block.kind].facets:
-            nodes = block.nodes[:, side]
-            if near is not None:
-                nodes = nodes[near[nodes].all(axis=1)]
-            found.setdefault(len(side), []).append(nodes)
+            some = block.nodes
+            if marked is not None:
+                some = some[np.logical_and.reduce([marked[:, k] for k in side])]
+            found.setdefault(len(side), []).append(some[:, side])
     return {size: np.concatenate(tables) for size, tables in found.items()}
 
 

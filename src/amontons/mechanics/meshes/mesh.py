@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from copy import copy
-from dataclasses import dataclass, field, replace
+from dataclasses import MISSING, dataclass, field, fields, replace
 from functools import cached_property
 
 import numpy as np
@@ -76,6 +76,22 @@ class Mesh(KeepsLocks):
         object.__setattr__(self, "surfaces", surfaces)
         object.__setattr__(self, "levels", checked_levels(self.levels, len(points)))
         object.__setattr__(self, "node_sets", self._checked_sets())
+
+    @classmethod
+    def of_checked(cls, points: Array, cells: tuple[Cells, ...], *, axisymmetric: bool) -> Mesh:
+        """A mesh without names, of cells of another one: what was checked there is not again.
+
+        points: those that cells have, no others; both are locked.
+        """
+        out = cls.__new__(cls)
+        for each in fields(cls):
+            made = each.default_factory
+            value = each.default if made is MISSING else made()
+            object.__setattr__(out, each.name, value)
+        for name, value in (("points", read_only(points)), ("cells", cells),
+                            ("axisymmetric", axisymmetric)):  # fmt: skip
+            object.__setattr__(out, name, value)
+        return out
 
     def _check_use(self) -> None:
         if not self.cells:

@@ -12,6 +12,7 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
+from ...core.arrays import read_only
 from ...core.errors import InvalidInput
 from .mesh import Mesh
 
@@ -85,6 +86,10 @@ def part_of(mesh: Mesh, wanted: Sequence[Index]) -> tuple[Mesh | None, Index]:
     ]
     if not blocks:
         return None, np.zeros(0, dtype=np.int64)
-    used = np.unique(np.concatenate([block.nodes.ravel() for block in blocks]))
-    cells = tuple(replace(b, nodes=np.searchsorted(used, b.nodes)) for b in blocks)
-    return Mesh(mesh.points[used], cells, axisymmetric=mesh.axisymmetric), used
+    marked = np.zeros(len(mesh.points), dtype=bool)
+    for block in blocks:
+        marked[block.nodes] = True
+    used = np.flatnonzero(marked)
+    number = np.cumsum(marked) - 1
+    cells = tuple(replace(b, nodes=read_only(number[b.nodes])) for b in blocks)
+    return Mesh.of_checked(mesh.points[used], cells, axisymmetric=mesh.axisymmetric), used

@@ -11,6 +11,7 @@ assembles and keeps its part, and together they run a semismooth Newton method
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -33,6 +34,7 @@ from .together import ended_together, together
 Array = NDArray[np.float64]
 Index = NDArray[np.int64]
 TOLERANCE = 1e-8
+SLAB = 10_000  # blocks that are moved at a time
 
 
 def distributed(
@@ -65,6 +67,7 @@ def distributed(
         give_back()  # what the first one has needed for the whole mesh
         rows = [together(comm, lambda: _rows(share))]
         problem = _problem(share, rows, comm, linear or Petsc())
+        share = replace(share, modes=share.modes[:0].copy())  # the matrix has them
         give_back()  # blocks of which PETSc has made its matrix
         found = SpreadActiveSet(problem).solve(float(tolerance))
         solution = DistributedSolution.of(share, problem, found, comm)
@@ -137,10 +140,11 @@ def _rows_of_body(
     own = share.own[local]
     counts = np.diff(K.indptr)
     row = np.repeat(np.arange(len(local), dtype=np.int32), counts)
-    column, blocks = K.indices, K.data
+    column, blocks = K.indices, np.asarray(K.data, dtype=float)
     if not own.all():
-        kept = own[row]
-        row, column, blocks = row[kept], column[kept], blocks[kept]
+        kept = np.flatnonzero(own[row])
+        row, column = row[kept], column[kept]
+        blocks = _moved_up(blocks, kept)
     for nodes, turn in ((row, "kab,kbc->kac"), (column, "kac,kbc->kab")):
         at = frame[local[nodes]]
         some = np.flatnonzero(at >= 0)
@@ -148,7 +152,17 @@ def _rows_of_body(
         blocks[some] = (np.einsum(turn, F, blocks[some]) if nodes is row
                         else np.einsum(turn, blocks[some], F))  # fmt: skip
     pointers = np.concatenate([[0], np.cumsum(counts[own])])
-    return pointers, share.number[local][column], np.asarray(blocks, dtype=float)
+    return pointers, share.number[local][column], blocks
+
+
+def _moved_up(blocks: Array, kept: Index) -> Array:
+    """blocks[kept], kept ascending, in the memory of blocks, which are not to be used then."""
+    for first in range(0, len(kept), SLAB):
+        some = kept[first : first + SLAB]
+        blocks[first : first + len(some)] = blocks[some]
+    if blocks.flags.owndata:
+        blocks.resize((len(kept), *blocks.shape[1:]), refcheck=False)
+    return blocks[: len(kept)]
 
 
 def _problem(

@@ -178,7 +178,7 @@ def _number(entry: object, what: str, free: bool) -> float:
         raise InvalidInput(
             f"{what}: expected numbers, got None (only supports leave components free)"
         )
-    if type(entry) is not float:  # what most functions return: no need to look closer
+    if not isinstance(entry, float):  # what most functions return: no need to look closer
         return number(what, entry)
     if not abs(entry) <= LARGEST:
         raise InvalidInput(f"{what}: expected a finite number, got {entry}")
