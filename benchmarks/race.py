@@ -211,6 +211,7 @@ CONSTANTS = {
     "agains": {e.name: e.again for e in ALONE if e.trial is not None},
 }  # fmt: skip
 LAST = {e.name for e in ALONE if e.last}
+WAITS = {e.name for e in ALONE if e.waits}
 
 
 class Replay:
@@ -271,6 +272,10 @@ def simulated(row, goal, c):
     total, lead = 0.0, next(iter(row["traces"]))
     fall = [(0.0, max((t.first for t in tracks.values()), default=1.0))]
 
+    def spare():
+        kinds = {n: -1 if n in row["needs"] else 1 for n in tracks if n not in LAST}
+        return sum(kind * tracks[n].cost for n, kind in kinds.items())
+
     def rest(name, mean):
         track = tracks[name]
         if name in row["needs"]:
@@ -278,7 +283,8 @@ def simulated(row, goal, c):
             if name in LAST:
                 return needed if track.cost < c["shares"][name] * total else math.inf
             if track.cost < needed:
-                return needed - track.cost
+                waits = name in WAITS and not track.at and spare() < needed
+                return math.inf if waits else needed - track.cost
         promise = track.promise(goal, c)
         likely = c["nears"].get(name, 0.0) * mean
         if track.cost < likely:

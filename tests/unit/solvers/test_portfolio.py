@@ -5,6 +5,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from race_methods import UNIT, costs, falling, rolling, state_of
 
 import amontons as am
 from amontons.mechanics.ready.gallery import random_delassus
@@ -16,10 +17,6 @@ from amontons.solvers.auto.tracks import polish
 from amontons.solvers.contract import Judgement, Target
 from amontons.solvers.sweeps.kernels import by_approach, sweep_data, watch_for
 from amontons.solvers.sweeps.momentum import Momentum
-
-
-def state_of(problem, tolerance=1e-8):
-    return State(problem, Target(tolerance), np.zeros((problem.contacts, 3)))
 
 
 def names_of(problem):
@@ -99,16 +96,6 @@ def test_every_track_alone_solves_an_easy_problem(entry):
     assert all(b <= a * (1 + 1e-9) for a, b in zip(errors, errors[1:], strict=False))
 
 
-def rolling(count, mu):
-    """A time step of spheres that turn at random, condensed."""
-    packing = am.SpherePacking(count, mu=mu, seed=1)
-    still, random = packing.problem(1e-3), np.random.default_rng(3)
-    omega = np.zeros((count, 6))
-    omega[:, 3:] = 10 * random.standard_normal((count, 3))
-    f = still.f + still.M @ omega.ravel()
-    return am.FrictionProblem.from_global(still.M, still.H, f, still.w, still.mu).condensed()
-
-
 def swept_alone(state, sweeps):
     """Error of the deep track alone after so many sweeps at least; the track."""
     track = Track(next(e for e in TRACKS if e.chunks is polish), state)
@@ -148,32 +135,6 @@ def test_many_contacts_that_are_all_coupled_are_swept_as_they_are_numbered():
 
 
 # ------------------------------------------------------------------ who goes on
-UNIT = 1e6  # nanoseconds: far more than letting a track in costs
-
-
-def falling(factor, cost, count=10**6):
-    """A method whose error falls by a factor with every chunk of that cost; it may end."""
-
-    def chunks(state):
-        error = state.first_error
-        yield Chunk(state.start, 0, 0.0)
-        for _ in range(count):
-            error *= factor
-            _ = yield Chunk(state.start, 1, cost * UNIT, error=error)
-
-    return chunks
-
-
-def costs(*entries, most=200):
-    """Cost of each track in UNIT when they have cost so much together, or at the goal."""
-    state = state_of(random_delassus(0, 10))
-    race = Race(state, entries)
-    for _ in race.iterates():
-        if state.error <= state.goal or race.total >= most * UNIT:
-            break
-    return {t.entry.name: t.cost / UNIT for t in race.tracks}, state.error <= state.goal
-
-
 def test_the_track_that_promises_the_end_first_goes_on():
     spent, done = costs(Entry("slow", falling(0.9, 1.0), share=0.1),
                         Entry("fast", falling(0.5, 1.0), share=0.1))  # fmt: skip

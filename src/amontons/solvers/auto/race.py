@@ -28,6 +28,9 @@ believed less: its rest counts C / (GRACE F) times.  Besides
                 the first chunk, unless the first track promises to be there for less, and has
                 what it usually needs before all others; where chunks are brief it waits with
                 the others, and comes before them
+    dear        smoothing Newton, and steps and sweeps in turn, begin where sweeps have cost as
+                much as all steps and what the new ones usually need: where none of them helps
+                these trials together cost no more than sweeps do
     nothing     where no track promises anything, the one that has cost least
 
     the end     where five times as much was spent as when the best error, or that of a track
@@ -102,11 +105,6 @@ class Turn(NamedTuple):
 Chunks = Generator[Chunk, Turn, None]
 
 
-def always(state: State) -> bool:
-    """Whatever the problem."""
-    return True
-
-
 @dataclass(frozen=True)
 class Entry:
     """A row of the table of tracks: chunks(state) where when(state) holds.
@@ -119,7 +117,7 @@ class Entry:
     at all.  again, trial: it is taken to need at most `again` times what it has cost, or what
     trial(state), nanoseconds, says that a trial costs where that is more; no bound where trial
     is None.  stacked: Newton steps that it usually takes on stacks of rigid blocks, where it
-    comes second; 0: it comes with the others.
+    comes second; 0: it comes with the others.  waits: it is dear.
     """
 
     name: str
@@ -127,12 +125,13 @@ class Entry:
     share: float = 0.0
     optimism: float = 1.0
     needs: Callable[[State], float] | None = None
-    when: Callable[[State], bool] = always
+    when: Callable[[State], bool] = lambda state: True
     last: bool = False
     near: float = 0.0
     again: float = math.inf
     trial: Callable[[State], float] | None = None
     stacked: int = 0
+    waits: bool = False
 
 
 @dataclass(eq=False)
@@ -177,10 +176,10 @@ class Track:
         self.foreseen = min(self.foreseen, self.cost + self.promise)
         return chunk
 
-    def rest(self, total: float, way: float = math.inf) -> float:
+    def rest(self, total: float, way: float = math.inf, spare: float = math.inf) -> float:
         """Nanoseconds to the goal that it promises, of `total` spent on all tracks.
 
-        way: nanoseconds of the whole way at the mean rate of the best of all.
+        way: nanoseconds of the whole way at the mean rate of the best of all; spare: `spare`.
         """
         entry = self.entry
         if entry.needs is not None:
@@ -188,7 +187,8 @@ class Track:
             if entry.last:
                 return needed if self.cost < entry.share * total else math.inf
             if self.cost < needed:
-                return needed - self.cost
+                waits = entry.waits and not self.errors and spare < needed
+                return math.inf if waits else needed - self.cost
         promise = self.promise
         if self.cost > GRACE * self.foreseen:
             promise *= self.cost / (GRACE * self.foreseen)
@@ -278,6 +278,12 @@ def whole_way(fall: list[tuple[float, float]], goal: float, near: float = NEAR) 
     return part * next(cost for cost, error in fall if error <= ALMOST * best)
 
 
+def spare(tracks: list[Track]) -> float:
+    """Nanoseconds that sweeps have cost more than methods of Newton's kind."""
+    racing = [track for track in tracks if not track.entry.last]
+    return sum(t.cost if t.entry.needs is None else -t.cost for t in racing)
+
+
 @dataclass(eq=False)
 class Race:
     """The tracks of one problem; the first of the table leads."""
@@ -297,10 +303,7 @@ class Race:
         self.fall = [(0.0, self.state.first_error)]  # total and best error whenever that fell
 
     def iterates(self) -> Iterates:
-        """The best reaction now and then, until nothing helps or is left.
-
-        A tighter goal that is sent counts from there on.
-        """
+        """The best reaction now and then, to the end; a tighter goal that is sent counts."""
         alone, leader = FIRST_CHUNKS, self.tracks[0]
         while leader in self.tracks and self._is_first(leader):
             yield from self._go_on(leader)
@@ -389,7 +392,8 @@ class Race:
     def _next(self) -> Track:
         """The track that promises the goal for the least cost."""
         way = whole_way(self.fall, self.state.goal)
-        rests = [track.rest(self.total, way) for track in self.tracks]
+        more = spare(self.tracks)
+        rests = [track.rest(self.total, way, more) for track in self.tracks]
         least = min(rests)
         if least < math.inf:
             return self.tracks[rests.index(least)]

@@ -54,14 +54,26 @@ def aimed(watch: Array, goal: float) -> None:
 
 
 def momentum(state: State) -> Chunks:
-    """Sweeps with Nesterov's momentum."""
-    memory, watch = Momentum(sweep_data(state.problem), state.start), watch_for(state.goal)
-    cost = state.momentum_cost
+    """Sweeps with Nesterov's momentum.
+
+    Where they hover they go on from the best reaction of the others, once, if that is far
+    better: what is left there may be no solution, from which they hover again.
+    """
+    data, cost = sweep_data(state.problem), state.momentum_cost
+    memory, watch = Momentum(data, state.start), watch_for(state.goal)
     turn = yield Chunk(memory.r, 0, 0.0)
+    mark, waited, begun = turn.error, 0, math.inf
     while True:
+        if waited > PATIENT and state.error < TAKEN * min(turn.error, begun):
+            memory, watch = Momentum(data, state.r), watch_for(state.goal)
+            mark = begun = state.error
+            waited = 0
         aimed(watch, state.goal)
         count, flops = memory.sweep(max(LEAST, int(turn.cost / cost)), watch)
         turn = yield Chunk(memory.r.copy(), count, cost * count, flops, watch[2])
+        waited += count
+        if turn.error < 0.5 * mark:
+            mark, waited = turn.error, 0
 
 
 def anderson(state: State) -> Chunks:
