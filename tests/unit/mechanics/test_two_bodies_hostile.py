@@ -72,9 +72,10 @@ def test_needles(dim):
     assert forces[1] == pytest.approx(forces[0], rel=0.1)
 
 
-def test_a_slave_without_master():
+@pytest.mark.parametrize("order", [1, 2])
+def test_a_slave_without_master(order):
     """Held by supports it is as without contact; held by nothing else it is told."""
-    beside = bodies(at=10.0)
+    beside = bodies(at=10.0, order=order)
     solution = am.solve(model(beside, am.Fix("upper.top", (0, -0.05))))
     assert solution.converged
     assert not np.ravel(solution.resultant).any()
@@ -194,6 +195,7 @@ def test_an_end_is_told_and_leaves_no_trace(what):
     with pytest.raises(am.NotConverged, match=words) as told:
         go()
     assert kept
+    assert "contact None" not in str(told.value)
     assert np.isfinite(told.value.solution.v).all()
     last = kept[-2].state
     found = [next(am.evolve(each, am.QuasiStatic(0.125), until=9.0, start=last)).state
