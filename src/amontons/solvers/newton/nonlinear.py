@@ -20,7 +20,7 @@ from typing import Any, ClassVar, Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-from ...core.errors import InvertedCells, SingularOperator
+from ...core.errors import InvertedCells, SingularOperator, TimeUp
 from ...core.options import check_options
 from ...linear import LinearSolver
 from ...problem.friction import FrictionProblem
@@ -176,6 +176,11 @@ class NonlinearNewton:
                         problem, (share, goal, v), first, target, linear, shown, predict is None
                     )
                     break
+                except (Breakdown, TimeUp) as ended:
+                    if target.seconds_left > 0:
+                        raise
+                    remark = problem.at_share(share).remark(v)
+                    raise Breakdown(f"{ended}; {remark}" if remark else str(ended)) from ended
                 except (Failed, InvertedCells) as failure:
                     reason, shown.note = str(failure), note
                     if stuck is None and isinstance(failure, _Stuck):
