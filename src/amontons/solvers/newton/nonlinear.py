@@ -154,9 +154,8 @@ class NonlinearNewton:
                     v, told = self.crossing.across(problem, share, v, target)
                     found = self._newton(problem, problem.states(v), target, linear, shown)
                     yield from shown.best(found, told)
-                hint = "" if self.crossing is not None else JUMP
-                if remark := problem.at_share(share).remark(v):
-                    hint = f"; {remark}"
+                remark = problem.at_share(share).remark(v)
+                hint = f"; {remark}" if remark else JUMP if self.crossing is None else ""
                 raise Breakdown(
                     f"no equilibrium found beyond {share:.4g} of the load: {reason}{hint}"
                 )
@@ -177,10 +176,7 @@ class NonlinearNewton:
                     )
                     break
                 except (Breakdown, TimeUp) as ended:
-                    if target.seconds_left > 0:
-                        raise
-                    remark = problem.at_share(share).remark(v)
-                    raise Breakdown(f"{ended}; {remark}" if remark else str(ended)) from ended
+                    raise self._placed(ended, problem.at_share(share), v, target) from ended
                 except (Failed, InvertedCells) as failure:
                     reason, shown.note = str(failure), note
                     if stuck is None and isinstance(failure, _Stuck):
@@ -250,6 +246,14 @@ class NonlinearNewton:
             w = w + length * step
             yield states.v(w), problem.reactions(states.v(w)), size
         raise Breakdown("out of time between two load steps")
+
+    @staticmethod
+    def _placed(
+        ended: Breakdown | TimeUp, problem: NonlinearProblem, v: Array, target: Target
+    ) -> Exception:
+        """The same end, with what v has to say where time is over."""
+        remark = "" if target.seconds_left > 0 else problem.remark(v)
+        return Breakdown(f"{ended}; {remark}") if remark else ended
 
     @staticmethod
     def _stop(problem: NonlinearProblem, v: Array) -> None:
