@@ -158,10 +158,11 @@ class Convergence(Shown):
         """The error beside its tolerance, and that of the weakest contact where it decides."""
         sign = "<=" if self.error <= self.tolerance else ">"
         text = f"error {self.error:.1e} {sign} {self.tolerance:.0e}"
-        if self.contact_error is None or self.contact_error <= self.contact_tolerance:
+        of_contact = self.contact_error if self.weakest is not None else None
+        if of_contact is None or of_contact <= self.contact_tolerance:
             return text
         return (
-            f"{text}, contact {self.weakest} {self.contact_error:.1e} > "
+            f"{text}, contact {self.weakest} {of_contact:.1e} > "
             f"{self.contact_tolerance:.0e} of its own scale"
         )
 

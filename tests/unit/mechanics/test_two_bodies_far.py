@@ -258,6 +258,24 @@ def test_a_side_of_the_slave_does_not_see_the_master_through_its_body():
     assert np.abs(force[1] - force[0]).max() < 1e-8 * np.abs(force[0]).max()
 
 
+@pytest.mark.parametrize(("dim", "tilt"), [(2, 0.02), (2, 0.5), (3, 0.02)])
+def test_a_side_of_the_slave_does_not_see_the_master_through_the_opposite_one(dim, tilt):
+    """A block beside a slab that rises towards it: its far side, edge-on, saw all of that."""
+    up, rest = np.eye(dim)[-1], (1,) * (dim - 2)
+    below = am.box((1, *rest, 0.5), (4, *rest, 2))
+    rising = below.points + np.outer(tilt * below.points[:, 0] * below.points[:, -1], 2 * up)
+    mesh = am.box((0.4, *rest, 0.8), (1, *rest, 2), origin=(1.1, *[0] * (dim - 2), 0.3))
+    sides = [mesh.surface(name)[0] for name in ("left", "bottom", "right")]
+    outline = replace(sides[0], nodes=np.concatenate([side.nodes for side in sides]))
+    bodies = [am.Body(replace(below, points=rising), NEO, name="lower"),
+              am.Body(mesh.with_surfaces({"outline": (outline,)}), NEO, name="upper")]
+    held = [am.Fix("lower.bottom", 0), am.Fix("upper.top", tuple(-0.02 * up))]
+    contact = pair(("upper.outline", "lower.top"), 0.3)
+    solution = am.solve(am.Model(bodies, held, contacts=[contact]))
+    assert solution.converged
+    assert not np.ravel(solution.resultant).any()
+
+
 # --------------------------------------------------------------- a slave wider than the master
 def test_a_slave_of_second_order_wider_than_the_master_sticks_in_a_few_steps():
     """Bulges were extrapolated beyond the master's rim: 46 steps, or no state at all."""

@@ -6,9 +6,11 @@ import numpy as np
 import pytest
 
 import amontons as am
+from amontons.core.clock import deadline_of
 from amontons.mechanics.meshes import Facets
 from amontons.mechanics.model.large_deformation import large_deformation
 from amontons.mechanics.model.overlapping import overlap_at_start
+from amontons.solvers.contract import Breakdown, Iterate, Target
 
 NEO = am.NeoHookean(1.0, 0.3)
 
@@ -72,9 +74,10 @@ def test_needles(dim):
     assert forces[1] == pytest.approx(forces[0], rel=0.1)
 
 
-def test_a_slave_without_master():
+@pytest.mark.parametrize("order", [1, 2])
+def test_a_slave_without_master(order):
     """Held by supports it is as without contact; held by nothing else it is told."""
-    beside = bodies(at=10.0)
+    beside = bodies(at=10.0, order=order)
     solution = am.solve(model(beside, am.Fix("upper.top", (0, -0.05))))
     assert solution.converged
     assert not np.ravel(solution.resultant).any()
@@ -194,6 +197,7 @@ def test_an_end_is_told_and_leaves_no_trace(what):
     with pytest.raises(am.NotConverged, match=words) as told:
         go()
     assert kept
+    assert "contact None" not in str(told.value)
     assert np.isfinite(told.value.solution.v).all()
     last = kept[-2].state
     found = [next(am.evolve(each, am.QuasiStatic(0.125), until=9.0, start=last)).state
@@ -201,6 +205,15 @@ def test_an_end_is_told_and_leaves_no_trace(what):
     for state in found:
         np.testing.assert_array_equal(state.displacement, kept[-1].state.displacement)
         np.testing.assert_array_equal(state.force, kept[-1].state.force)
+
+
+def test_who_runs_out_of_time_is_told_the_place_too():
+    """A limit of time hid what words would have said after it."""
+    problem = large_deformation(model(bodies(at=10.0), am.Fix("upper.top", (0, -0.05))))
+    target = Target(1e-8, deadline_of(1e-9))
+    start = Iterate(problem.reactions(problem.known_state), None)
+    with pytest.raises(Breakdown, match="stopped after .*'upper.bottom' faces 'lower.top' no"):
+        list(am.NonlinearNewton().iterates(problem, start, target))
 
 
 def test_load_steps_shorten_and_lengthen_themselves():
@@ -218,6 +231,21 @@ def test_a_cell_that_is_inverted_from_the_start():
     with pytest.raises(am.InvalidInput, match=r"cell|inside out"):
         am.solve(model([lower, am.Body(replace(upper.mesh, points=points), NEO, name="upper")],
                        am.Fix("upper.top", (0, -0.05))))  # fmt: skip
+
+
+@pytest.mark.parametrize("kind", ["tri", "tet"])
+def test_a_cell_whose_node_went_through_its_opposite_side_is_named(kind):
+    """It was taken for one that is numbered the other way round, and overlapped others."""
+    flat = kind == "tri"
+    mesh = am.box((1, 1), 3, kind=kind) if flat else am.box((1, 1, 1), 3, kind=kind)
+    either = mesh.cells[0].nodes.copy()
+    either[::2, :2] = either[::2, 1::-1]  # numbered so, all is well
+    (region,) = replace(mesh, cells=(replace(mesh.cells[0], nodes=either),)).cells
+    assert np.array_equal(np.sort(region.nodes), np.sort(mesh.cells[0].nodes))
+    points = mesh.points.copy()
+    points[np.linalg.norm(points - 1 / 3, axis=1).argmin()] += 0.6
+    with pytest.raises(am.InvalidInput, match=rf"{kind} cell near \(.*\).* inside out"):
+        replace(mesh, points=points)
 
 
 @pytest.mark.parametrize(("held", "count"), [(0.35, 2), (0.7, 4)])

@@ -85,7 +85,7 @@ class BulgeSlopes:
             at = (nodes[:, :, None] * d + np.arange(d)).reshape(k, s * d)
             values = ((held @ less[of].swapaxes(1, 2))[:, :, None]
                       * by_weight[of].swapaxes(1, 2)[:, None])  # fmt: skip  # (., s, c, p)
-            by_weights.append((values.reshape(k, s * d, -1), at, rows[of]))
+            by_weights.append((values.reshape(k, s * d, w.shape[1]), at, rows[of]))
             by_theta.append(((held @ turned[of]).reshape(k, s * d, 1), at, of[:, None]))
         n, nc, f = self.at.x.size, len(self.at.slaves), len(w)
         theta = self._blends[:, None], parts.of[:, None], self.integrals[2]

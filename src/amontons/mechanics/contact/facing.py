@@ -287,3 +287,20 @@ def seen_through(other: Index, gap: Array, length: Array) -> Mask:
     behind = np.full(len(length), -np.inf)
     np.maximum.at(behind, other, gap)
     return gap < np.minimum(behind[other], 0.0) - length[other]
+
+
+def aside(slave: Skin, master: Skin, x: Array, of: Index, other: Index) -> Mask:
+    """Pairs (k,) that share nothing as the master sees them, along its own normal.
+
+    of, other (k,): facets of both.  A facet is a disc around its centre here, of radius r:
+    seen along the master's normal N the slave's, of normal n, reaches r sqrt(1 - (n . e)^2)
+    along e, the way between both centres, and the master's its own radius.  What touches is
+    opposite both ways; a side of a slave that a master passes edge-on, far away, is not.
+    """
+    (centre, n, reach), (there, N, radius) = (shapes(one, x) for one in (slave, master))
+    way = centre[of] - there[other]
+    way -= (way * N[other]).sum(axis=1)[:, None] * N[other]
+    length = np.linalg.norm(way, axis=1)
+    e = way / np.where(length > 0, length, 1.0)[:, None]
+    flat = np.sqrt(np.maximum(1 - (n[of] * e).sum(axis=1) ** 2, 0.0))
+    return np.asarray(length > radius[other] + reach[of] * flat)

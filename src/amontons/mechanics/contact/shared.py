@@ -22,7 +22,7 @@ from numpy.typing import NDArray
 
 from .dual import dual_functions, nodes_with_multiplier, sharing_functions
 from .facet_integrals import FacetPairs
-from .facing import Skin, candidates, nearest, seen_through, shapes
+from .facing import Skin, aside, candidates, nearest, seen_through, shapes
 
 if TYPE_CHECKING:
     from .current_mortar import MortarPair
@@ -74,6 +74,9 @@ class Shared:
         if fold is None and (gap[there] < 0).any():
             length = 2 * shapes(master, x)[2]
             there = there[~seen_through(other[there], gap[there], length)]
+            behind = there[gap[there] < 0]
+            lost = behind[aside(slave, master, x, of[behind], other[behind])]
+            there = np.setdiff1d(there, lost, assume_unique=True)
         there = there[nearest(of[there], area[there], gap[there], whole)]
         reached = np.bincount(of[there], area[there], minlength=len(whole))
         there = there[(reached > SLIVER * whole)[of[there]]]

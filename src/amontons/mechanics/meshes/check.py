@@ -57,12 +57,43 @@ def checked_cells(points: Array, kind: str, nodes: ArrayLike, region: str) -> In
     low, high = (np.concatenate(each) for each in zip(*found, strict=True))
     turned = high < -FLAT
     table[turned] = table[np.flatnonzero(turned)[:, None], MIRROR[kind]]
+    if turned.any() and not turned.all():
+        _check_neighbours(cell, table, turned, points, region)
     bad = np.flatnonzero(~turned & (low <= FLAT))
     if bad.size:
         raise InvalidInput(
             _complaint(kind, region, table[bad[0]], points, int(bad.size), float(low[bad[0]]))
         )
     return read_only(table)
+
+
+def _check_neighbours(
+    cell: ReferenceCell, table: Index, turned: NDArray[np.bool_], points: Array, region: str
+) -> None:
+    """Raise InvalidInput where mirrored cells lie on the same side of a facet as another one.
+
+    Files may number cells either way round; but of one whose node has moved through its
+    opposite side the mirror image overlaps the neighbours, and goes round facets as they do.
+    """
+    corners = CELLS[FIRST.get(cell.kind, cell.kind)].facets
+    bad: set[int] = set()
+    for size in {len(side) for side in corners}:
+        same_size = [list(side) for side in corners if len(side) == size]
+        sides = np.concatenate([table[:, side] for side in same_size])
+        owner = np.tile(np.arange(len(table)), len(same_size))
+        if size > 2:  # from the least node on
+            first = sides.argmin(axis=1)[:, None]
+            sides = np.take_along_axis(sides, (first + np.arange(size)) % size, axis=1)
+        order = np.lexsort(sides.T)
+        same = np.flatnonzero((np.diff(sides[order], axis=0) == 0).all(axis=1))
+        both = np.concatenate([owner[order[same]], owner[order[same + 1]]])
+        bad.update(both[turned[both]].tolist())
+    if bad:
+        centre = ", ".join(f"{c:.4g}" for c in points[table[min(bad)]].mean(axis=0))
+        raise InvalidInput(
+            f"mesh: {cell.kind} cell near ({centre}) in region {region!r} is inside out and "
+            f"overlaps its neighbours; {len(bad)} such cells, expected none"
+        )
 
 
 def check_repeated(points: Array, blocks: Sequence[Cells]) -> None:

@@ -20,7 +20,7 @@ from typing import Any, ClassVar, Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-from ...core.errors import InvertedCells, SingularOperator
+from ...core.errors import InvertedCells, SingularOperator, TimeUp
 from ...core.options import check_options
 from ...linear import LinearSolver
 from ...problem.friction import FrictionProblem
@@ -154,9 +154,8 @@ class NonlinearNewton:
                     v, told = self.crossing.across(problem, share, v, target)
                     found = self._newton(problem, problem.states(v), target, linear, shown)
                     yield from shown.best(found, told)
-                hint = "" if self.crossing is not None else JUMP
-                if remark := problem.at_share(share).remark(v):
-                    hint = f"; {remark}"
+                remark = problem.at_share(share).remark(v)
+                hint = f"; {remark}" if remark else JUMP if self.crossing is None else ""
                 raise Breakdown(
                     f"no equilibrium found beyond {share:.4g} of the load: {reason}{hint}"
                 )
@@ -176,6 +175,8 @@ class NonlinearNewton:
                         problem, (share, goal, v), first, target, linear, shown, predict is None
                     )
                     break
+                except (Breakdown, TimeUp) as ended:
+                    raise self._placed(ended, problem.at_share(share), v, target) from ended
                 except (Failed, InvertedCells) as failure:
                     reason, shown.note = str(failure), note
                     if stuck is None and isinstance(failure, _Stuck):
@@ -250,6 +251,14 @@ class NonlinearNewton:
     def _right(problem: NonlinearProblem, v: Array, target: Target) -> bool:
         """True for a state that will do: tests of steps there compare rounding."""
         return problem.error(problem.reactions(v), v) <= target.tolerance
+
+    @staticmethod
+    def _placed(
+        ended: Breakdown | TimeUp, problem: NonlinearProblem, v: Array, target: Target
+    ) -> Exception:
+        """The same end, with what v has to say where time is over."""
+        remark = "" if target.seconds_left > 0 else problem.remark(v)
+        return Breakdown(f"{ended}; {remark}") if remark else ended
 
     @staticmethod
     def _stop(problem: NonlinearProblem, v: Array) -> None:
