@@ -92,7 +92,7 @@ def test_shear_that_uneven_tetrahedra_lock_in_is_halved():
     bodies = []
     for seed, (name, z) in enumerate((("lower", -2), ("upper", 0))):
         mesh = am.box((4, 4, 2), (9, 9, 4), "tet", origin=(-2, -2, z))
-        bodies.append(am.Body(uneven(mesh, 0.12, seed), STEEL, name))
+        bodies.append(am.Body(uneven(mesh, 0.11, seed), STEEL, name))
     found = am.solve(am.Model(
         bodies, [am.Fix("lower.bottom", 0), am.Fix("upper.top", (0, 0, -0.06))],
         [am.Contact("upper.bottom", master="lower.top", mu=0.5,

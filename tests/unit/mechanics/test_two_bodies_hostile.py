@@ -51,8 +51,8 @@ def test_a_slave_that_folds_back():
     """A facet that looks away takes no part; the others do."""
     mesh = am.box((1, 1), (5, 4), kind="tri")
     points = mesh.points.copy()
-    for old, new in (((0.4, 0), (0.64, 0.12)), ((0.6, 0.25), (0.7, 0.4)),
-                     ((0.4, 0.25), (0.45, 0.3))):  # fmt: skip
+    for old, new in (((0.4, 0), (0.64, 0.12)), ((0.6, 0.25), (0.83, 0.25)),
+                     ((0.4, 0.25), (0.44, 0.4)), ((0.8, 0.25), (0.92, 0.25))):  # fmt: skip
         points[np.linalg.norm(mesh.points - old, axis=1).argmin()] = new
     upper = am.Body(replace(mesh, points=points), NEO, name="upper")
     solution = am.solve(model([bodies()[0], upper], am.Fix("upper.top", (0.02, -0.05))))
