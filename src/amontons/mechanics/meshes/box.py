@@ -14,6 +14,7 @@ from ...core.arrays import WHOLE, real
 from ...core.errors import InvalidInput, shown
 from ...core.words import helpful
 from .cells import FACET_KIND
+from .check import MIRROR
 from .facets import Cells, Facets, sides
 from .mesh import Mesh
 
@@ -53,7 +54,7 @@ def box(
     unit = np.stack(np.meshgrid(*axes, indexing="ij"), axis=-1)
     unit = unit.transpose(*range(dim - 1, -1, -1), dim).reshape(-1, dim)  # x runs fastest
     cube = _cubes(counts)
-    nodes = cube if kind in ("hex", "quad") else _simplices(cube, dim)
+    nodes = cube if kind in ("hex", "quad") else _simplices(cube, kind)
     block = Cells(kind, nodes)
     surfaces = _sides(unit, block, dim)
     levels = _levels(counts, lengths, kind)
@@ -96,13 +97,16 @@ def _cubes(counts: tuple[int, ...]) -> Index:
     return first[:, None] + corner
 
 
-def _simplices(cube: Index, dim: int) -> Index:
+def _simplices(cube: Index, kind: str) -> Index:
     """Each cube cut into dim! simplices along its diagonal (conforming between neighbours)."""
+    dim = 2 if kind == "tri" else 3
     position = {2: [0, 1, 3, 2], 3: [0, 1, 3, 2, 4, 5, 7, 6]}[dim]  # bits of (x, y, z) -> VTK
     pieces = []
     for order in permutations(range(dim)):
         path = np.cumsum([0, *(1 << axis for axis in order)])
-        pieces.append(cube[:, [position[p] for p in path]])
+        nodes = [position[p] for p in path]
+        odd = np.linalg.det(np.eye(dim)[list(order)]) < 0  # then its image has positive volume
+        pieces.append(cube[:, [nodes[k] for k in MIRROR[kind]] if odd else nodes])
     return np.stack(pieces, axis=1).reshape(-1, dim + 1)
 
 
