@@ -118,16 +118,17 @@ def test_tangents_are_exact_in_2d_and_second_order():
     assert checked(curved, 7, draws=4, size=0.005) > 2
 
 
-def with_held_side(law):
+def with_held_side(law, obstacle=None):
     """The plates with slave nodes of one edge, and all of the side above, held along x."""
-    model = slider((0, 0, -PRESS), law)
+    model = slider((0, 0, -PRESS), law, obstacle=obstacle)
     return am.Model(model.bodies, [*model.supports, am.Fix("upper.left", (0, None, None))],
                     model.contacts)  # fmt: skip
 
 
 @pytest.mark.parametrize("law", LAWS[1:3])
-def test_tangents_are_exact_where_supports_hold_springs(law):
-    assert checked(with_held_side(law), 3, draws=6) > 3
+@pytest.mark.parametrize("obstacle", [am.Sphere((0.8, 0.5, -3), 3), None])
+def test_tangents_are_exact_where_supports_hold_springs(law, obstacle):
+    assert checked(with_held_side(law, obstacle), 3, draws=6) > 3
 
 
 def test_supports_take_what_springs_are_drawn_in_their_direction():

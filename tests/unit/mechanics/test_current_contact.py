@@ -179,6 +179,26 @@ def test_kinematics_is_said_on_the_contact():
 
 
 # ---------------------------------------------------------------- example 5 of the 2014 paper
+@pytest.mark.parametrize("mu", [0.0, 0.3])
+def test_supports_hold_a_node_across_its_obstacle(mu):
+    """One corner of a block on a slope is held along x: small loads as with small strains."""
+    turn = np.array([[np.cos(0.4), -np.sin(0.4)], [np.sin(0.4), np.cos(0.4)]])
+    mesh = am.box((1, 1), 2)
+    mesh = am.Mesh(mesh.points @ turn, mesh.cells, mesh.surfaces)
+    slope = am.Contact("bottom", am.Plane(tuple(turn[1])), mu=mu)
+    supports = [am.Fix("top", (0, -1e-6)), am.Fix("left", (0, None))]
+    found, forces = [], []
+    for law in (am.LinearElastic(100.0, 0.3), am.SaintVenantKirchhoff(100.0, 0.3)):
+        step = am.solve(am.Model([am.Body(mesh, law)], supports, [slope]), tolerance=1e-9)
+        found.append(np.concatenate(step.displacement))
+        forces.append(np.einsum("pk,pkc->pc", step.solution.r, step.fields.frames))
+    small, finite = found
+    np.testing.assert_allclose(finite, small, atol=1e-5 * np.abs(small).max())
+    size = np.abs(forces[0]).max()
+    np.testing.assert_allclose(forces[1][:, 1], forces[0][:, 1], atol=1e-5 * size)
+    np.testing.assert_allclose(forces[1][0, 0], 0.0, atol=1e-12 * size)  # the support takes it
+
+
 def triangle(radius, friction=0.5):
     """One triangle, a free corner in the origin, before a disc: the printed curved g.
 

@@ -14,6 +14,7 @@ from ..contact.carried import TiedPair
 from ..contact.current_mortar import MortarPair, folded
 from ..contact.current_pairs import ObstaclePair, Pair, between_bodies
 from ..contact.facing import Skin
+from ..contact.free_normals import FreeNormals
 from ..contact.geometry import Plane
 from ..contact.overlap import is_itself
 from .supports import locate
@@ -38,7 +39,9 @@ def met_pairs(model: Model, slaves: list[Index], linear: Discretisation) -> list
     for contact, nodes, own in zip(model.contacts, slaves, linear.placed, strict=True):
         axes = _axes(own, linear)
         if contact.obstacle is not None:
-            out.append(ObstaclePair(contact.obstacle, nodes, axes=axes))  # type: ignore[arg-type]
+            side = FreeNormals(contact.obstacle, is_free[nodes])
+            obstacle = contact.obstacle if side.free.all() else side
+            out.append(ObstaclePair(obstacle, nodes, axes=axes))
             continue
         skins, meshes = [], []
         for side in (contact.slave, *contact.masters):
