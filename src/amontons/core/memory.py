@@ -20,6 +20,6 @@ def give_back() -> None:
 def trim() -> None:
     """The same of what is free already."""
     if sys.platform == "linux":
-        trim = getattr(ctypes.CDLL(None), "malloc_trim", None)  # glibc alone has it
-        if trim is not None:
-            trim(ctypes.c_size_t(0))
+        release = getattr(ctypes.CDLL(None), "malloc_trim", None)  # glibc alone has it
+        if release is not None:
+            release(ctypes.c_size_t(0))

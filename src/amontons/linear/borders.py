@@ -12,6 +12,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from .node_blocks import slots_of_rows
 from .petsc import petsc
 
 Array = NDArray[np.float64]
@@ -73,9 +74,7 @@ class Rows:
 
     def of(self, rows: Index) -> Rows:
         """Some of them, (m,)."""
-        counts = np.diff(self.pointers)[rows]
-        ends = np.concatenate([[0], np.cumsum(counts)])
-        slots = np.arange(ends[-1]) + np.repeat(self.pointers[rows] - ends[:-1], counts)
+        slots, ends = slots_of_rows(self.pointers, rows)
         return Rows(ends, self.columns[slots], self.blocks[slots])
 
     @classmethod

@@ -88,9 +88,7 @@ class NodeBlocks:
 
     def slots(self, node: Integers) -> tuple[Index, Index]:
         """Places of the entries of rows (k,), row after row, and the ends of these (k + 1,)."""
-        counts = np.diff(self.indptr)[node]
-        ends = np.concatenate([[0], np.cumsum(counts)])
-        return np.arange(ends[-1]) + np.repeat(self.indptr[node] - ends[:-1], counts), ends
+        return slots_of_rows(self.indptr, node)
 
     def rows(self, node: Index) -> NodeBlocks:
         """The block rows of some nodes, (k,), as the rows of a matrix."""
@@ -157,6 +155,13 @@ class NodeBlocks:
         arguments = self.indptr, self.indices, self.data, order, number, indptr, indices, data
         over_rows(_renumber, self.nodes, 2.0 * self.work, *arguments)
         return NodeBlocks(indptr, indices, data, self.inverse[order])
+
+
+def slots_of_rows(pointers: Integers, rows: Integers) -> tuple[Index, Index]:
+    """Places of the entries of rows (k,), row after row, and the ends of these (k + 1,)."""
+    counts = np.diff(pointers)[rows]
+    ends = np.concatenate([[0], np.cumsum(counts)])
+    return np.arange(ends[-1]) + np.repeat(pointers[rows] - ends[:-1], counts), ends
 
 
 def _spread(rows: sparse.csr_array, place: Index, size: int) -> sparse.csr_array:

@@ -17,6 +17,7 @@ from numpy.typing import NDArray
 from ..core.arrays import expect_shape, read_only
 from ..core.clock import NEVER, Deadline
 from ..core.errors import SingularOperator, UnsupportedForm
+from ..core.prepared import Prepared
 from ..linear.blocks import (
     BlockRows,
     block_rows,
@@ -269,12 +270,11 @@ class Equations(Matrices):
 
     def kept_alone(self, make: Callable[[Self], T]) -> T:
         """make(problem), made once for this problem with its load and law, see `kept`."""
-        found = self._made.get(make)
-        return self._made.setdefault(make, make(self)) if found is None else found
+        return self._alone.once(make, (), self)
 
     @cached_property
-    def _made(self) -> dict[Callable[..., Any], Any]:
-        return {}
+    def _alone(self) -> Prepared:
+        return Prepared()
 
     def accepted(
         self, r: Array, v: Array | None, error: float, tolerance: float
