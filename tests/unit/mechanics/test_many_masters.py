@@ -90,6 +90,41 @@ def test_masters_of_other_kinds_of_cells():
     check(am.Model(parts, held, [pair]), 0.02, 3)
 
 
+def overlapping(dim, at=0.0, kind=None, order=1):
+    """A block over two blocks whose ends lie in each other by .1, not at one height."""
+    deep = () if dim == 2 else (1,)
+    cells = [(2, *deep, 1), (3, *deep, 1)]
+    boxes = [("left", cells[0], (1, *deep, 1), (-0.5, *(0 for _ in deep), -1)),
+             ("right", cells[1], (1, *deep, 1), (0.4, *(0 for _ in deep), -1.02)),
+             ("upper", cells[1], (1, *(0.8 for _ in deep), 0.5), (at, *(0.1 for _ in deep), 0))]
+    parts = [body(name, size, number, origin, order, kind)
+             for name, number, size, origin in boxes]
+    held = [am.Fix("left.bottom", 0), am.Fix("right.bottom", 0), am.Fix("upper.top", 0)]
+    pair = am.Contact("upper.bottom", master="left.top", more_masters=["right.top"], mu=0.3)
+    return am.Model(parts, held, [pair])
+
+
+@pytest.mark.parametrize("dim", [2, 3])
+def test_what_overlapping_masters_cover_counts_once_wherever_they_are(dim):
+    """What faces any of them, at most all of a facet; no jumps of averages as ends pass."""
+    parts = large_deformation(overlapping(dim)).parts
+    [pair] = parts.contact.pairs
+    upper = np.isin(np.arange(len(parts.X)), pair.slave.all)
+    found = []
+    for way in np.linspace(-0.3, 0.3, 61):
+        meeting = pair.at(parts.X + np.where(upper[:, None], np.eye(dim)[0] * way, 0.0))
+        assert np.abs(meeting.shared.covered - 1).max() < 1e-9
+        found.append(meeting.averages @ parts.X[:, -1])
+    assert np.abs(np.diff(found, axis=0)).max() < 3e-3  # .02 of height, over .1 of the way
+
+
+@pytest.mark.parametrize(("dim", "kind", "order"), [
+    (2, None, 1), (2, "tri", 2), (3, None, 1), (3, "tet", 2),
+])  # fmt: skip
+def test_tangents_over_overlapping_masters_are_exact(dim, kind, order):
+    check(overlapping(dim, 0.02, kind, order), 0.005, 3)
+
+
 def check(model, size, least):
     """The tangent at random states against differences."""
     rng = np.random.default_rng(3)

@@ -40,10 +40,8 @@ class BulgeSlopes:
         """Derivatives of theta by the dofs of pairs, (k, w), that add up to those of facets."""
         parts, skin, own = self.at.shared, self.at.pair.slave, self.integrals[0]
         f, (a, d) = len(parts.facets), (skin.nodes.shape[1], self.at.x.shape[1])
-        areas = skin.areas(self.at.x)[parts.facets]
-        whole = np.linalg.norm(areas, axis=1)
-        slopes = skin.area_slopes(self.at.x)[parts.facets].reshape(f, d, a * d)
-        grown = np.einsum("fd,fdw->fw", areas / whole[:, None], slopes)
+        whole = np.linalg.norm(skin.areas(self.at.x)[parts.facets], axis=1)
+        grown = skin.size_slopes(self.at.x, parts.facets)
         out = own[:, :, :a].sum(axis=(1, 2))  # of c times the area; the area's in equal parts
         grown *= (parts.covered / np.bincount(parts.of, minlength=f))[:, None]
         out[:, : a * d] -= grown[parts.of]

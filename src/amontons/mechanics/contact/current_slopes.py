@@ -143,12 +143,19 @@ class MortarSlopes:
 
         Those of own add up to the ones of their facet.
         """
-        parts, pair = self.at.shared, self.at.pair
-        slave, master = pair.slave.nodes[parts.slave], pair.master.nodes[parts.master]
-        own, cross = FacetPairs.of(
-            pair.slave, parts.slave, pair.master, parts.master, self.at.x
-        ).slopes()
-        return own, cross, dofs_of(np.concatenate([slave, master], axis=1), self.at.x.shape[1])
+        parts, pair, d = self.at.shared, self.at.pair, self.at.x.shape[1]
+        count = len(parts.slave if parts.cut is None else parts.cut.share)
+        of, other = parts.slave[:count], parts.master[:count]
+        own, cross = FacetPairs.of(pair.slave, of, pair.master, other, self.at.x).slopes()
+        dofs = dofs_of(
+            np.concatenate([pair.slave.nodes[of], pair.master.nodes[other]], axis=1), d
+        )
+        if parts.cut is None:
+            return own, cross, dofs
+        whole = pair.slave.size_slopes(self.at.x, parts.cut.facets)
+        own, cross, beside = parts.cut.slopes(own, cross, parts.cross[:count], whole)
+        nothing = np.zeros((len(beside), *own.shape[1:]))
+        return np.concatenate([own, nothing]), cross, np.concatenate([dofs, dofs[beside]])
 
     @cached_property
     def weights(self) -> Rows:

@@ -9,6 +9,7 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 from scipy import sparse
+from scipy.sparse import csgraph
 
 from ..meshes.cells import CELLS
 from ..meshes.facets import Facets, corner_facets
@@ -108,6 +109,27 @@ class Skin:
         return np.unique(np.concatenate([self.nodes.ravel(), self.middles.ravel()]))
 
     @cached_property
+    def pieces(self) -> Index:
+        """Which surface that hangs together by its corners each facet is of, (f,)."""
+        f, a = self.nodes.shape
+        entries = np.ones(f * a), (np.repeat(np.arange(f), a), self.nodes.ravel())
+        by_node = sparse.csr_array(entries, shape=(f, int(self.nodes.max()) + 1))
+        label = csgraph.connected_components(by_node @ by_node.T, directed=False)[1]
+        return np.asarray(label, dtype=np.int64)
+
+    @cached_property
+    def rim(self) -> Index:
+        """Corners (k,) where the surface ends: at sides of one facet alone; ascending."""
+        if self.nodes.shape[1] == 2:
+            sides = self.nodes.reshape(-1, 1)
+        else:
+            after = np.roll(self.nodes, -1, axis=1)
+            after[np.arange(len(after)), self.corners - 1] = self.nodes[:, 0]
+            sides = np.stack([self.nodes, after], axis=2)[self.real]
+        found, count = np.unique(np.sort(sides, axis=1), axis=0, return_counts=True)
+        return np.unique(found[count == 1])
+
+    @cached_property
     def means(self) -> tuple[Index, Index, Array]:
         """Middle, corner it lies between, and part of it, (k,) each, every pair once."""
         real = np.arange(self.middles.shape[1]) < self.bent[:, None]
@@ -176,6 +198,14 @@ class Skin:
         out[:, :, -1] += by_second
         out[:, :, 1] -= by_second
         return out
+
+    def size_slopes(self, x: Array, chosen: Index) -> Array:
+        """Derivatives of the areas of chosen facets (k,) by their nodes, (k, a d)."""
+        some = self.part(chosen)
+        areas = some.areas(x)
+        n = areas / np.linalg.norm(areas, axis=1)[:, None]
+        slopes = np.einsum("kd,kdac->kac", n, some.area_slopes(x))
+        return slopes.reshape(len(areas), slopes.shape[1] * slopes.shape[2])
 
     def normal_slopes(self, x: Array, chosen: Index) -> Array:
         """Derivatives of the unit normals of chosen facets (k,) by their nodes, (k, d, a d)."""

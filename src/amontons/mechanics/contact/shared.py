@@ -22,7 +22,8 @@ from numpy.typing import NDArray
 
 from .dual import dual_functions, nodes_with_multiplier, sharing_functions
 from .facet_integrals import FacetPairs
-from .facing import Skin, aside, candidates, nearest, seen_through, shapes
+from .facing import Skin, aside, candidates, seen_through, shapes
+from .layers import Cut, shares
 
 if TYPE_CHECKING:
     from .current_mortar import MortarPair
@@ -41,7 +42,8 @@ class Shared:
 
     own (f, a, a + e), cross (k, a, b + h): integrals with corners and middles of slave and
     master; psi (f, a, a): A of `current_slopes`; kept (f, a): slots that carry force; even
-    (f, a, a): phi of (1) in phi; covered (f,): c.
+    (f, a, a): phi of (1) in phi; covered (f,): c.  cut: of pairs that count by a part, after
+    which stand those that only change with them, without anything shared.
     """
 
     slave: Index
@@ -54,6 +56,7 @@ class Shared:
     kept: Mask
     even: Array
     covered: Array
+    cut: Cut | None = None
 
     @classmethod
     def at(cls, pair: MortarPair, x: Array, without: Mask) -> Shared:
@@ -77,13 +80,20 @@ class Shared:
             behind = there[gap[there] < 0]
             lost = behind[aside(slave, master, x, of[behind], other[behind])]
             there = np.setdiff1d(there, lost, assume_unique=True)
-        there = there[nearest(of[there], area[there], gap[there], whole)]
-        reached = np.bincount(of[there], area[there], minlength=len(whole))
-        there = there[(reached > SLIVER * whole)[of[there]]]
-        of, other, cross = of[there], other[there], cross[there]
+        piece = np.zeros(len(there), dtype=np.int64) if fold else master.pieces[other[there]]
+        part = shares(of[there], piece, area[there], gap[there], whole)
+        reached = np.bincount(of[there], part * area[there], minlength=len(whole))
+        heeded = (part > 0) & (reached > SLIVER * whole)[of[there]]
+        there, part = there[heeded], part[heeded]
+        of, other, own = of[there], other[there], own[there]
+        cut, cross = Cut.of(of, part, own), cross[there] * part[:, None, None]
         facets, numbers = np.unique(of, return_inverse=True)
         total = np.zeros((len(facets), *own.shape[1:]))
-        np.add.at(total, numbers, own[there])
+        np.add.at(total, numbers, own * part[:, None, None])
+        if cut is not None:
+            more = np.concatenate([np.arange(len(of)), cut.extra])
+            of, other, numbers = of[more], other[more], numbers[more]
+            cross = np.concatenate([cross, np.zeros((len(cut.extra), *cross.shape[1:]))])
         mass = total[:, :, :a]
         least = HARDLY if pair.areas is None else 0.0
         kept = _carrying(slave, facets, mass, whole, without, least)
@@ -91,7 +101,7 @@ class Shared:
         even = sharing_functions(kept, slave.real[facets])
         covered = mass.sum(axis=(1, 2)) / whole[facets]
         covered = np.where(np.abs(covered - 1) < ROUNDING, 1.0, covered)
-        return cls(of, other, facets, numbers, total, cross, psi, kept, even, covered)
+        return cls(of, other, facets, numbers, total, cross, psi, kept, even, covered, cut)
 
     @property
     def mass(self) -> Array:

@@ -334,8 +334,9 @@ class LargeDeformation(NonlinearProblem):
                        load_scale=max(tangent.load, float(np.linalg.norm(force))))  # fmt: skip
 
     def remark(self, v: Array) -> str:
-        """Which slaves face nothing of their masters, have left them, and what is flat."""
-        return places_of_failure(self.parts, self.displacement(v), self.earlier)
+        """Which slaves face nothing of their masters, leave or hang on edges; what is flat."""
+        u, closed = self.displacement(v), self.contact_point(v).pieces % 4 > 0
+        return places_of_failure(self.parts, u, self.earlier, closed)
 
     def closed_pieces(self, v: Array) -> list[Pieces]:
         """The active pieces with touching contacts stuck, then with all of them stuck."""

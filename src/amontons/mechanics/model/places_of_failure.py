@@ -9,39 +9,70 @@ from numpy.typing import NDArray
 
 from ..contact.current_mortar import MortarMeeting
 from ..contact.current_pairs import Meetings
+from ..contact.shared import HARDLY
 from ..elements.hyperelasticity import HyperelasticBody
 from .nonlinear_parts import NonlinearParts
 from .worst_cells import flattest, turned_corner
 
 Array = NDArray[np.float64]
-FLAT = 0.3  # det F below which a cell is worth a word
+Mask = NDArray[np.bool_]
+FLAT = 0.5  # det F below which a cell is worth a word
 LEFT = 0.5  # of what a node bore for itself, `fading`, below which it is worth a word
 
 
-def places_of_failure(parts: NonlinearParts, u: Array, earlier: Meetings) -> str:
+def places_of_failure(
+    parts: NonlinearParts, u: Array, earlier: Meetings, closed: Mask
+) -> str:
     """What may be wrong at displacements u (nodes, d), in words; "" where nothing is seen.
 
-    earlier: where sides met at the beginning of the step.
+    earlier: where sides met at the beginning of the step; closed (nc,): who bears.
     """
-    told = [*_parted(parts.meet(u), earlier), *_flat(parts, u)]
+    told = [*_parted(parts.meet(u), earlier, closed), *_flat(parts, u)]
     return f"at the last state {', '.join(told)}" if told else ""
 
 
-def _parted(now: Meetings, earlier: Meetings) -> Iterator[str]:
-    """Slaves that face nothing of their masters, or are leaving their edges."""
-    for here, before in zip(now.parts, earlier.parts, strict=True):
+def _parted(now: Meetings, earlier: Meetings, closed: Mask) -> Iterator[str]:
+    """Slaves that face nothing of their masters, are leaving their edges, or hang on them."""
+    ends = np.cumsum([len(here.slaves) for here in now.parts])[:-1]
+    for here, before, bears in zip(
+        now.parts, earlier.parts, np.split(closed, ends), strict=True
+    ):
         if not (isinstance(here, MortarMeeting) and isinstance(before, MortarMeeting)):
             continue
         if here.pair.fold is not None:
             continue
         names = "{!r} faces {!r}".format(*here.pair.names)
-        left = np.flatnonzero(here.remembered < LEFT * before.remembered)
+        faced = before.remembered
+        left = np.flatnonzero((faced > HARDLY) & (here.remembered < LEFT * faced))
         if not here.met.any():
             yield f"{names} nowhere: no contact force holds anything there"
         elif len(left):
-            place = ", ".join(f"{c:.4g}" for c in here.x[here.slaves[left[0]]])
             less = f"by less than half, or no more, at {len(left)} nodes"
-            yield f"{names} {less}, as at ({place})"
+            yield f"{names} {less}, as at ({_place(here, left[0])})"
+        elif (edge := _hanging(here, bears)) is not None:
+            yield f"{names} along an edge alone, as at ({_place(here, edge)})"
+
+
+def _place(here: MortarMeeting, row: int) -> str:
+    return ", ".join(f"{c:.4g}" for c in here.x[here.slaves[row]])
+
+
+def _hanging(here: MortarMeeting, bears: Mask) -> int | None:
+    """A slave (row) that bears where no facet of either side bears as a whole, else None.
+
+    All that bear lie on the rim of their own side, or where the master ends.
+    """
+    skin, shared = here.pair.slave, here.shared
+    rows = np.flatnonzero(bears & here.met)
+    bearing, ending = np.zeros((2, len(here.x)), dtype=bool)
+    bearing[here.slaves[rows]] = True
+    whole = np.zeros(len(skin.nodes), dtype=bool)
+    whole[shared.facets] = shared.covered >= 1
+    if (whole & bearing[skin.nodes].all(axis=1)).any():
+        return None
+    ending[skin.rim] = True
+    ending[skin.nodes[~whole]] = True
+    return int(rows[0]) if len(rows) and ending[bearing].all() else None
 
 
 def _flat(parts: NonlinearParts, u: Array) -> Iterator[str]:
