@@ -31,6 +31,20 @@ def test_a_table_of_pressure_over_overclosure(tmp_path):
     assert top(hard) == pytest.approx([-8e-3] * 4, rel=1e-7)
 
 
+@pytest.mark.parametrize("law", ["LINEAR\n800., .5", "TABULAR\n0., 0.\n2., .01\n6., .02"])
+def test_strains_stay_finite_where_contact_is_asked_to_be_hard(tmp_path, law):
+    """As with HARD in the deck, which is not as at small strains."""
+    large = SMOOTH.replace("*STEP", "*STEP, NLGEOM")
+    assert large != SMOOTH
+    asked = solved(tmp_path, large.replace(HARD, f"OVERCLOSURE={law}"), "deck.hard=true")
+    plain = solved(tmp_path, large)
+    assert same(asked, plain)
+    assert not same(plain, solved(tmp_path, SMOOTH))
+    small = solved(tmp_path, large.replace(HARD, f"OVERCLOSURE={law}"), "deck.hard=true",
+                   "deck.small=true")  # fmt: skip
+    assert same(small, solved(tmp_path, SMOOTH))
+
+
 def test_the_tension_far_away_bends_the_line_of_nodes_only(tmp_path):
     """K d (1/2 + atan(d/e)/pi) with e = pi sigma / K."""
     line = SMOOTH.replace(HARD, "OVERCLOSURE=LINEAR\n800., .5")

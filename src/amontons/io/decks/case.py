@@ -50,7 +50,7 @@ from .general import found_pairs, motion_of, part_titles, read_general, self_con
 from .history import History, read_history
 from .joints import Joints, tied
 from .keywords import left_out, plain, sorted_out
-from .large import gives_way, of_size
+from .large import of_size
 from .materials import read_interactions, read_sections
 from .meshing import Region
 from .options import PLACED, with_known_options
@@ -99,8 +99,7 @@ def read(path: Path, overrides: Sequence[str] = (), method: str | None = None) -
         raise cards[-1].error("the deck ends here without a *STEP, it loads nothing")
     try:
         make = partial(_case, path, deck, settings, options)
-        small = options.small or (options.hard and gives_way(deck))
-        return of_size(make, deck, notes, small=small)
+        return of_size(make, deck, notes, small=options.small)
     except FileFormatError:
         raise
     except AmontonsError as reason:

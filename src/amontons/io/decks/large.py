@@ -30,12 +30,6 @@ def is_large(deck: Deck) -> bool:
     return any("NLGEOM" in card.options and card.label("NLGEOM") != "NO" for card in heads)
 
 
-def gives_way(deck: Deck) -> bool:
-    """Whether contact has a stiffness: small strains then, also where it is taken as hard."""
-    cards = [placed.card for placed in deck.model if placed.card.keyword == "SURFACEBEHAVIOR"]
-    return any((card.label("PRESSURE-OVERCLOSURE") or "HARD") != "HARD" for card in cards)
-
-
 def of_size(make: Make, deck: Deck, notes: list[str], *, small: bool) -> Case:
     """The case make(notes, finite), at finite strains where the deck asks and models have them.
 
