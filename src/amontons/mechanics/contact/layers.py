@@ -87,8 +87,11 @@ class Cut:
         pairs = np.flatnonzero(np.isin(of, facets))
         group = np.searchsorted(facets, of[pairs])
         members = np.flatnonzero(cut)
-        owner, link = np.nonzero(number[:, None] == group)
-        owner = members[owner]
+        order, many = np.argsort(group, kind="stable"), np.bincount(group)
+        each = many[number]
+        begin = np.repeat((np.cumsum(many) - many)[number] - (np.cumsum(each) - each), each)
+        link = order[begin + np.arange(len(begin))]
+        owner = np.repeat(members, each)
         return cls(share, facets, area, total, members[first], pairs, group, owner, link)
 
     @property
