@@ -41,7 +41,7 @@ class Shared:
 
     own (f, a, a + e), cross (k, a, b + h): integrals with corners and middles of slave and
     master; psi (f, a, a): A of `current_slopes`; kept (f, a): slots that carry force; even
-    (f, a, a): phi of (1) in phi; covered (f,): c.
+    (f, a, a): phi of (1) in phi; covered (f,): c; opposed (k,): o of `edge_on`.
     """
 
     slave: Index
@@ -54,13 +54,15 @@ class Shared:
     kept: Mask
     even: Array
     covered: Array
+    opposed: Array
 
     @classmethod
     def at(cls, pair: MortarPair, x: Array, without: Mask) -> Shared:
         """At positions x (nodes, d); without (nodes,): those that have no row."""
         slave, master, fold = pair.slave, pair.master, pair.fold
         of, other = candidates(slave, master, x) if fold is None else fold.candidates(x)
-        own, cross = FacetPairs.of(slave, of, master, other, x).integrals()
+        pairs = FacetPairs.of(slave, of, master, other, x)
+        (own, cross), opposed = pairs.integrals(), pairs.opposed
         a = own.shape[1]
         p, q = slave.values(x)[of], master.values(x)[other]
         area = own[:, :, :a].sum(axis=(1, 2))
@@ -77,8 +79,9 @@ class Shared:
             behind = there[gap[there] < 0]
             lost = behind[aside(slave, master, x, of[behind], other[behind])]
             there = np.setdiff1d(there, lost, assume_unique=True)
-        there = there[nearest(of[there], area[there], gap[there], whole)]
-        reached = np.bincount(of[there], area[there], minlength=len(whole))
+        seen = area / np.where(opposed > 0, opposed, 1.0)
+        there = there[nearest(of[there], seen[there], gap[there], whole)]
+        reached = np.bincount(of[there], seen[there], minlength=len(whole))
         there = there[(reached > SLIVER * whole)[of[there]]]
         of, other, cross = of[there], other[there], cross[there]
         facets, numbers = np.unique(of, return_inverse=True)
@@ -91,7 +94,8 @@ class Shared:
         even = sharing_functions(kept, slave.real[facets])
         covered = mass.sum(axis=(1, 2)) / whole[facets]
         covered = np.where(np.abs(covered - 1) < ROUNDING, 1.0, covered)
-        return cls(of, other, facets, numbers, total, cross, psi, kept, even, covered)
+        return cls(of, other, facets, numbers, total, cross, psi, kept, even, covered,
+                   opposed[there])  # fmt: skip
 
     @property
     def mass(self) -> Array:
