@@ -258,22 +258,66 @@ def test_a_side_of_the_slave_does_not_see_the_master_through_its_body():
     assert np.abs(force[1] - force[0]).max() < 1e-8 * np.abs(force[0]).max()
 
 
-@pytest.mark.parametrize(("dim", "tilt"), [(2, 0.02), (2, 0.5), (3, 0.02)])
-def test_a_side_of_the_slave_does_not_see_the_master_through_the_opposite_one(dim, tilt):
-    """A block beside a slab that rises towards it: its far side, edge-on, saw all of that."""
+def outlined(mesh):
+    """The mesh with a surface of bottom and both sides."""
+    sides = [mesh.surface(name)[0] for name in ("left", "bottom", "right")]
+    outline = replace(sides[0], nodes=np.concatenate([side.nodes for side in sides]))
+    return mesh.with_surfaces({"outline": (outline,)})
+
+
+@pytest.mark.parametrize(("dim", "tilt"), [(2, 0.02), (2, 0.5), (3, 0.02),
+                                           (2, -0.02), (2, -0.15), (3, -0.15)])  # fmt: skip
+def test_a_side_of_the_slave_does_not_touch_a_master_edge_on_beyond_its_end(dim, tilt):
+    """A block beside a slab: its far side saw one that rises, its near side one that falls."""
     up, rest = np.eye(dim)[-1], (1,) * (dim - 2)
     below = am.box((1, *rest, 0.5), (4, *rest, 2))
     rising = below.points + np.outer(tilt * below.points[:, 0] * below.points[:, -1], 2 * up)
-    mesh = am.box((0.4, *rest, 0.8), (1, *rest, 2), origin=(1.1, *[0] * (dim - 2), 0.3))
-    sides = [mesh.surface(name)[0] for name in ("left", "bottom", "right")]
-    outline = replace(sides[0], nodes=np.concatenate([side.nodes for side in sides]))
+    at = (1.1 if tilt > 0 else 1.4, *[0] * (dim - 2), 0.3)
+    mesh = am.box((0.4, *rest, 0.8), (1, *rest, 2), origin=at)
     bodies = [am.Body(replace(below, points=rising), NEO, name="lower"),
-              am.Body(mesh.with_surfaces({"outline": (outline,)}), NEO, name="upper")]
+              am.Body(outlined(mesh), NEO, name="upper")]
     held = [am.Fix("lower.bottom", 0), am.Fix("upper.top", tuple(-0.02 * up))]
     contact = pair(("upper.outline", "lower.top"), 0.3)
     solution = am.solve(am.Model(bodies, held, contacts=[contact]))
     assert solution.converged
     assert not np.ravel(solution.resultant).any()
+
+
+@pytest.mark.parametrize("swap", [False, True])
+def test_sides_of_a_block_that_is_pressed_bear_nothing(swap):
+    """They see the slab edge-on: forces were .9 % off, with the slab's side as slave 17 %."""
+    below, force = am.box((2, 1), (10, 3), origin=(-0.5, -1)), []
+    for name in ("bottom", "outline"):
+        bodies = [am.Body(below, NEO, name="lower"),
+                  am.Body(outlined(am.box((1, 1), (4, 3))), NEO, name="upper")]
+        sides = (f"upper.{name}", "lower.top")[:: -1 if swap else 1]
+        held = [am.Fix("lower.bottom", 0), am.Fix("upper.top", (0, -0.05))]
+        solution = am.solve(am.Model(bodies, held, contacts=[pair(sides, 0.3)]))
+        force.append(np.abs(np.ravel(solution.resultant)[-1]))
+    assert force[1] == pytest.approx(force[0], rel=3e-3)
+
+
+@pytest.mark.parametrize("swap", [False, True])
+@pytest.mark.parametrize("dim", [2, 3])
+def test_the_tangent_is_exact_where_sides_lean_over(dim, swap):
+    """Some of their facets are hardly opposite the slab."""
+    deep = (1,) * (dim - 2)
+    mesh = am.box((1, *deep, 0.6), (2, *deep, 2), origin=(0.3, *[0] * (dim - 2), 0.01))
+    moved = mesh.points.copy()
+    moved[:, 0] += 0.8 * (moved[:, 0] - 0.8) * moved[:, -1]
+    below = am.box((1.6, *deep, 0.5), (5, *deep, 1), origin=(0, *[0] * (dim - 2), -0.5))
+    bodies = [am.Body(below, NEO, name="lower"),
+              am.Body(outlined(replace(mesh, points=moved)), NEO, name="upper")]  # fmt: skip
+    sides = ("upper.outline", "lower.top")[:: -1 if swap else 1]
+    model = am.Model(bodies, [am.Fix("lower.bottom", 0), am.Fix("upper.top", 0)],
+                     contacts=[pair(sides, 0.3)])  # fmt: skip
+    rng, parts = np.random.default_rng(3), large_deformation(model).parts
+    problem = large_step(model, *np.zeros((2, parts.X.size)),
+                         0.02 * rng.standard_normal(parts.X.size))  # fmt: skip
+    seen = parts.meet(np.zeros(parts.X.shape)).parts[0].shared.opposed
+    assert ((seen > 0) & (seen < 1)).sum() > 1
+    draws = (rng.standard_normal((2, problem.unknowns)) * [[0.02], [1.0]] for _ in range(10))
+    assert checked_tangents(problem, draws) > 6
 
 
 # --------------------------------------------------------------- a slave wider than the master

@@ -33,6 +33,12 @@ LEAST = 1e-3
 STEP = 1e-100
 
 
+def rising(t: Values) -> Values:
+    """S of (2) with 0 as GONE and 1 as WHOLE."""
+    t = np.where(t.real < 1, np.where(t.real > 0, t, 0.0), 1.0)
+    return np.asarray(t**3 * (10 - 15 * t + 6 * t * t))
+
+
 def visible(slave: Values, master: Values) -> Values:
     """w of (2), (k,), of quadrilaterals master (k, 4, 3) seen from facets slave (k, a, 3)."""
     normal = np.cross(slave[:, 2] - slave[:, 0], slave[:, -1] - slave[:, 1])
@@ -46,9 +52,7 @@ def visible(slave: Values, master: Values) -> Values:
     sigma = (corners * normal[:, None]).sum(axis=2) / facing[:, None]
     tau = (corners * area[:, None]).sum(axis=2) / size[:, None]
     q = (sigma * tau + LEAST**2) / (tau * tau + LEAST**2)
-    t = (q - GONE) / (WHOLE - GONE)
-    t = np.where(t.real < 1, np.where(t.real > 0, t, 0.0), 1.0)
-    return np.where(ok, np.prod(t**3 * (10 - 15 * t + 6 * t * t), axis=1), 0.0)
+    return np.where(ok, np.prod(rising((q - GONE) / (WHOLE - GONE)), axis=1), 0.0)
 
 
 def visible_slopes(slave: Array, master: Array) -> Array:

@@ -1,12 +1,13 @@
 """Normals at slave nodes: of what faces the master, and where it ends those of the master.
 
 Around a node p are slave facets f with r_f corners and the area vectors a_f, out of the slave,
-of which parts k of the areas C_k face master facets with the unit normals n_k, out of these:
+of which parts k of the areas C_k face master facets with the unit normals n_k, out of these,
+and stand opposite them by o_k (`opposed`, which the areas C_k are taken times):
 
-    c_f = sum_k C_k / |a_f|,
-    N_p = sum_f (- c_f^2 a_f + (1 - c_f) sum_k C_k n_k) / r_f,      n_p = N_p / |N_p|,      (1)
+    c_f = sum_k C_k / |a_f|,    b_k = (1 - c_f) o_k,    m_f = - a_f / |a_f|,
+    N_p = sum_f sum_k C_k ((1 - b_k) m_f + b_k n_k) / r_f,      n_p = N_p / |N_p|,          (1)
 
-the area average of what faces the master, by c_f of the slave's own normals and by 1 - c_f of
+the area average of what faces the master, by 1 - b_k of the slave's own normals m and by b_k of
 the master's.  A facet that faces the master from end to end has its own; one that goes on
 beyond the master's end is a chord from below a rim to what rises beside it: its tilt is none
 of the contact, and no mesh makes it smaller, while the side that ends has its normal up to
@@ -26,6 +27,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .current_slopes import SlotSlopes
+from .facet_integrals import FacetPairs
 from .facing import dofs_of, shapes
 
 if TYPE_CHECKING:
@@ -89,15 +91,32 @@ class FacedNormals:
 
     @cached_property
     def _there(self) -> Array:
-        """sum_k C_k n_k, (f, d)."""
+        """sum_k o_k C_k n_k, (f, d)."""
         out = np.zeros(self._own.shape)
-        np.add.at(out, self.of, self._areas[:, None] * self._master)
+        parts = (self.at.shared.opposed * self._areas)[:, None] * self._master
+        np.add.at(out, self.of, parts)
         return out
 
     @cached_property
+    def _whole(self) -> Array:
+        """|a|, (f, 1), 1 of points."""
+        whole = np.linalg.norm(self._own, axis=1)[:, None]
+        return np.where(whole > 0, whole, 1.0)
+
+    @cached_property
+    def _opposed(self) -> Array:
+        """q = sum_k o_k C_k / |a|, (f,)."""
+        parts = self.at.shared.opposed * self._areas
+        return np.bincount(self.of, parts, minlength=len(self._own)) / self._whole[:, 0]
+
+    @cached_property
     def _factor(self) -> Array:
-        """c^2 (f, a, 1), 1 of nodes that do not meet."""
-        return np.where(self._partly, (self.covered**2)[:, None], 1.0)[:, :, None]
+        """c - (1 - c) q (f, a, 1), 1 of nodes that do not meet."""
+        out = np.ones((*self._partly.shape, 1))
+        if self._partly.any():
+            own = self.covered - (1 - self.covered) * self._opposed
+            out[self._partly] = np.broadcast_to(own[:, None, None], out.shape)[self._partly]
+        return out
 
     @cached_property
     def sums(self) -> Array:
@@ -147,22 +166,30 @@ class FacedNormals:
         own (f, a, d, a d): by corners of the slave; by_sum (f, a, d, d): n by N, of slots that
         meet partly; slopes (f, d, a d): of area vectors; row (f, a).
         """
-        c, area = self.covered, self._own
-        whole = np.linalg.norm(area, axis=1)[:, None]
-        whole = np.where(whole > 0, whole, 1.0)
-        by_part = -(2 * c[:, None] * area + self._there) / whole  # N by c, over |a|
-        by_part = by_sum @ by_part[:, None, :, None]
-        along = np.einsum("fd,fdw->fw", area / whole, slopes)
-        own -= by_part * (c[:, None] * along)[:, None, None, :]
+        c, q, unit = self.covered[:, None], self._opposed[:, None], self._own / self._whole
+        by_c = -(1 + q) * unit - self._there / self._whole  # N by c, over |a|
+        by_whole = by_sum @ (c * by_c + (1 - c) * q * unit)[:, None, :, None]
+        along = np.einsum("fd,fdw->fw", unit, slopes)
+        own -= by_whole * along[:, None, None, :]
         cut = np.asarray(self._partly.any(axis=1))
         pairs = np.flatnonzero(cut[self.of])
-        of, left = self.of[pairs], (1 - c)[self.of[pairs], None]
+        of, o = self.of[pairs], self.at.shared.opposed[pairs, None]
+        left, C = 1 - c[of], self._areas[pairs, None]
         _, cross, dofs = self.at.slopes.integrals
         master, corners = self.at.pair.master, self.at.pair.master.nodes.shape[1]
         grown = cross[pairs][:, :, :corners].sum(axis=(1, 2))
-        by_area = by_part[of] + by_sum[of] @ (left * self._master[pairs])[:, None, :, None]
-        values = by_area * grown[:, None, None, :]
+        apart = left * (unit[of] + self._master[pairs])
+        values = by_sum[of] @ (by_c[of] + o * apart)[:, None, :, None]
+        values = values * grown[:, None, None, :]
+        by_o = by_sum[of] @ (C * apart)[:, None, :, None]
+        values += by_o * self._opposed_slopes(pairs)[:, None, None, :]
         turned = master.normal_slopes(self.at.x, self.at.shared.master[pairs])
-        turned *= (left * self._areas[pairs, None])[:, :, None]
+        turned *= (left * o * C)[:, :, None]
         values[..., -turned.shape[2] :] += by_sum[of] @ turned[:, None]
         return SlotSlopes(values, np.where(self._partly[of], row[of], -1), dofs[pairs])
+
+    def _opposed_slopes(self, chosen: Index) -> Array:
+        """Derivatives of o by the dofs of chosen parts, (q, w)."""
+        at, parts = self.at, self.at.shared
+        return FacetPairs.of(at.pair.slave, parts.slave[chosen], at.pair.master,
+                             parts.master[chosen], at.x).opposed_slopes()  # fmt: skip

@@ -7,8 +7,9 @@ functions of first order of both and the integrals over the part they share, on 
 
 Facets of second order are projected as those on their corners are; behind phi and N stand then
 the functions of their other nodes, which move the surface by the bulges of `facing`.
-The integrals depend on the corners of the two facets alone; those of a warped facet that is
-seen all but edge-on fade, see `edge_on`.  Derivatives between lines are those of a complex
+The integrals depend on the corners of the two facets alone; those of facets that do not face
+each other fade, see `opposed`, and of a warped one that is seen all but edge-on, see `edge_on`:
+they are taken times o w.  Derivatives between lines are those of a complex
 step: the real parts decide where parts end, imaginary ones of 1e-100 carry the derivative
 through, exact to rounding as nothing is subtracted.
 
@@ -18,6 +19,7 @@ solid mechanics", Comput. Methods Appl. Mech. Engrg. 193 (2004) 601-629.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
 from dataclasses import dataclass, fields
 from functools import cached_property
@@ -28,13 +30,14 @@ from numpy.typing import NDArray
 
 from .edge_on import visible, visible_slopes
 from .facing import Skin
+from .opposed import STEP, cosine, opposed, steps
 from .plane_integrals import plane_integrals, plane_slopes, rules
 
 Array = NDArray[np.float64]
 Index = NDArray[np.int64]
 Values = NDArray[Any]  # real, or complex in the search for derivatives
-STEP = 1e-100
 BESIDE = 0.5 / np.sqrt(3.0)
+WHOLE = np.sqrt(0.5)  # cosine from which on o is 1
 GAUSS = ((0.5 - BESIDE, 0.5), (0.5 + BESIDE, 0.5))  # exact, as (1) is cubic at most
 
 
@@ -104,37 +107,108 @@ class FacetPairs:
 
     def integrals(self) -> tuple[Array, Array]:
         """mass (k, a, a + e) and cross (k, a, b + h)."""
-        if self.slave.shape[2] == 2:
-            return self._on_lines(self.slave, self.master)
-        return self._in_space(plane_integrals)
+        return self._times(self._visible * self.opposed)
 
     def slopes(self) -> tuple[Array, Array]:
         """Their derivatives by all corners, (k, a, a + e, (a + b) d) and (k, a, b + h, ...)."""
-        (k, a, d), b = self.slave.shape, self.master.shape[1]
-        ways = (a + b) * d
-        if d == 3:
-            return self._slopes_in_space(ways)
-        both = np.concatenate([self.slave, self.master], axis=1).reshape(k, ways)
-        moved = both[:, None, :] + 1j * STEP * np.eye(ways)
-        moved = moved.reshape(k, ways, a + b, d)
-        found = self._on_lines(moved[:, :, :a], moved[:, :, a:])
-        mass, cross = (np.moveaxis(part.imag, 1, -1) / STEP for part in found)
-        return mass, cross
+        return self._slopes_times(self._visible * self.opposed, FacetPairs._slopes_of_both)
 
+    # ---------------------------------------------------------------- what fades
     @cached_property
     def _visible(self) -> Array:
-        """w of `edge_on`, (k,), 1 for triangles."""
+        """w of `edge_on`, (k,), 1 for lines and triangles."""
         out, quads = np.ones(len(self.facing)), self.facing == 4
-        out[quads] = visible(self.slave[quads], self.master[quads])
+        if quads.any():
+            out[quads] = visible(self.slave[quads], self.master[quads])
         return out
 
-    def _in_space(self, kernel: Callable[..., None], *ways: int) -> tuple[Array, Array]:
-        """What a kernel finds, times w."""
+    def _visible_slopes(self) -> Array:
+        """Its derivatives by all corners, (k, (a + b) d)."""
+        out, quads = np.zeros((len(self.facing), self._ways)), self.facing == 4
+        if quads.any():
+            out[quads] = visible_slopes(self.slave[quads], self.master[quads])
+        return out
+
+    @cached_property
+    def _turned(self) -> Index:
+        """Pairs of which o may be below 1."""
+        return np.flatnonzero(cosine(self.slave, self.master) < WHOLE)
+
+    @cached_property
+    def opposed(self) -> Array:
+        """o of `opposed`, (k,)."""
+        out, some = np.ones(len(self.facing)), self.part(self._turned)
+        if len(self._turned):
+            back = some._other_way
+            seen = back._times(back._visible)[0].sum(axis=(1, 2))
+            out[self._turned] = opposed(some.slave, some.master, seen)
+        return out
+
+    def opposed_slopes(self) -> Array:
+        """Its derivatives by all corners, (k, (a + b) d)."""
+        out, some = np.zeros((len(self.facing), self._ways)), self.part(self._turned)
+        if len(self._turned):
+            back, theirs = some._other_way, math.prod(self.master.shape[1:])
+            seen = back._times(back._visible)[0].sum(axis=(1, 2))
+            by = back._slopes_times(back._visible, FacetPairs._visible_slopes)[0]
+            by = np.roll(by.sum(axis=(1, 2)), -theirs, axis=1)  # of the slave first
+            moved = (seen[:, None] + 1j * STEP * by).ravel()
+            found = opposed(*steps(some.slave, some.master), moved)
+            out[self._turned] = found.imag.reshape(by.shape) / STEP
+        return out
+
+    def _slopes_of_both(self) -> Array:
+        """Derivatives of w o by all corners, (k, (a + b) d)."""
+        w, o = self._visible[:, None], self.opposed[:, None]
+        return w * self.opposed_slopes() + o * self._visible_slopes()
+
+    @property
+    def _other_way(self) -> FacetPairs:
+        """Sides exchanged, of first order."""
+        flat = np.zeros_like(self.bent)
+        return FacetPairs(self.master, self.facing, self.slave, self.corners, flat, flat,
+                          (0, 0))  # fmt: skip
+
+    # ---------------------------------------------------------------- integrals
+    @property
+    def _ways(self) -> int:
+        """(a + b) d."""
+        return (self.slave.shape[1] + self.master.shape[1]) * self.slave.shape[2]
+
+    def _times(self, w: Array) -> tuple[Array, Array]:
+        """Integrals times w (k,)."""
+        if self.slave.shape[2] == 3:
+            return self._in_space(plane_integrals, w)
+        mass, cross = self._on_lines(self.slave, self.master)
+        return _over(w, mass) * mass, _over(w, cross) * cross
+
+    def _slopes_times(
+        self, w: Array, slopes: Callable[[FacetPairs], Array]
+    ) -> tuple[Array, Array]:
+        """Derivatives of integrals times w (k,), of which `slopes` makes those."""
+        if self.slave.shape[2] == 3:
+            found = self._in_space(plane_slopes, w, self._ways)
+        else:
+            mass, cross = self._on_moved_lines()
+            found = _over(w, mass) * mass, _over(w, cross) * cross
+        fades = np.flatnonzero((w > 0) & (w < 1))
+        if not len(fades):
+            return found
+        some = self.part(fades)
+        by = slopes(some)[:, None, None]
+        for out, part in zip(found, some._times(np.ones(len(fades))), strict=True):
+            out[fades] += part[..., None] * by
+        return found
+
+    def _in_space(
+        self, kernel: Callable[..., None], w: Array, *ways: int
+    ) -> tuple[Array, Array]:
+        """What a kernel finds, times w (k,)."""
         (k, a, _), b = self.slave.shape, self.master.shape[1]
         e, h = self.widths
         found = np.zeros((k, a, a + e, *ways)), np.zeros((k, a, b + h, *ways))
         numbers = np.stack([self.corners, self.facing, self.bent, self.opposite], axis=1)
-        given, w = rules(second=e + h > 0), self._visible
+        given = rules(second=e + h > 0)
         if (w == 1).all():
             kernel(self.slave, self.master, numbers, *given, *found)
             return found
@@ -145,17 +219,13 @@ class FacetPairs:
             out[some] = part * _over(w[some], part)
         return found
 
-    def _slopes_in_space(self, ways: int) -> tuple[Array, Array]:
-        """w times the derivatives of the integrals, and these times that of w."""
-        found = self._in_space(plane_slopes, ways)
-        fades = np.flatnonzero((self._visible > 0) & (self._visible < 1))
-        if not len(fades):
-            return found
-        some = self.part(fades)
-        by = visible_slopes(some.slave, some.master)[:, None, None]
-        for out, part in zip(found, some.integrals(), strict=True):
-            out[fades] += (part / _over(some._visible, part))[..., None] * by
-        return found
+    def _on_moved_lines(self) -> tuple[Array, Array]:
+        """Derivatives of integrals over lines by all corners."""
+        (k, a, d), b, ways = self.slave.shape, self.master.shape[1], self._ways
+        mine, theirs = steps(self.slave, self.master)
+        found = self._on_lines(mine.reshape(k, ways, a, d), theirs.reshape(k, ways, b, d))
+        mass, cross = (np.moveaxis(part.imag, 1, -1) / STEP for part in found)
+        return mass, cross
 
     def part(self, chosen: Index) -> FacetPairs:
         """Some of the pairs."""

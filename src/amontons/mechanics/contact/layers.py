@@ -28,15 +28,17 @@ Array = NDArray[np.float64]
 Index = NDArray[np.int64]
 
 
-def shares(of: Index, piece: Index, area: Array, gap: Array, whole: Array) -> Array:
+def shares(
+    of: Index, piece: Index, area: Array, seen: Array, gap: Array, whole: Array
+) -> Array:
     """w of (1), (k,), of pairs; 0 of what is behind others of its own piece, too.
 
-    of, piece (k,): slave facet and piece of the master; area, gap (k,) of what they share;
-    whole: areas of slave facets.
+    of, piece (k,): slave facet and piece of the master; area, gap (k,) of what they share,
+    seen (k,) the area before it fades by `opposed`; whole: areas of slave facets.
     """
     own, group = np.unique(np.stack([of, piece]), axis=1, return_inverse=True)
     group = group.ravel()
-    first = nearest(group, area, gap, whole[own[0]])
+    first = nearest(group, seen, gap, whole[own[0]])
     if own.shape[1] == len(np.unique(of)):
         return first.astype(float)
     covered = np.bincount(group, area * first)

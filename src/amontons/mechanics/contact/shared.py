@@ -42,8 +42,9 @@ class Shared:
 
     own (f, a, a + e), cross (k, a, b + h): integrals with corners and middles of slave and
     master; psi (f, a, a): A of `current_slopes`; kept (f, a): slots that carry force; even
-    (f, a, a): phi of (1) in phi; covered (f,): c.  cut: of pairs that count by a part, after
-    which stand those that only change with them, without anything shared.
+    (f, a, a): phi of (1) in phi; covered (f,): c; opposed (k,): o of `opposed`.  cut: of pairs
+    that count by a part, after which stand those that only change with them, without anything
+    shared.
     """
 
     slave: Index
@@ -56,6 +57,7 @@ class Shared:
     kept: Mask
     even: Array
     covered: Array
+    opposed: Array
     cut: Cut | None = None
 
     @classmethod
@@ -63,7 +65,8 @@ class Shared:
         """At positions x (nodes, d); without (nodes,): those that have no row."""
         slave, master, fold = pair.slave, pair.master, pair.fold
         of, other = candidates(slave, master, x) if fold is None else fold.candidates(x)
-        own, cross = FacetPairs.of(slave, of, master, other, x).integrals()
+        pairs = FacetPairs.of(slave, of, master, other, x)
+        (own, cross), opposed = pairs.integrals(), pairs.opposed
         a = own.shape[1]
         p, q = slave.values(x)[of], master.values(x)[other]
         area = own[:, :, :a].sum(axis=(1, 2))
@@ -81,11 +84,12 @@ class Shared:
             lost = behind[aside(slave, master, x, of[behind], other[behind])]
             there = np.setdiff1d(there, lost, assume_unique=True)
         piece = np.zeros(len(there), dtype=np.int64) if fold else master.pieces[other[there]]
-        part = shares(of[there], piece, area[there], gap[there], whole)
-        reached = np.bincount(of[there], part * area[there], minlength=len(whole))
+        seen = area[there] / opposed[there]
+        part = shares(of[there], piece, area[there], seen, gap[there], whole)
+        reached = np.bincount(of[there], part * seen, minlength=len(whole))
         heeded = (part > 0) & (reached > SLIVER * whole)[of[there]]
         there, part = there[heeded], part[heeded]
-        of, other, own = of[there], other[there], own[there]
+        of, other, own, opposed = of[there], other[there], own[there], opposed[there]
         cut, cross = Cut.of(of, part, own), cross[there] * part[:, None, None]
         facets, numbers = np.unique(of, return_inverse=True)
         total = np.zeros((len(facets), *own.shape[1:]))
@@ -93,6 +97,7 @@ class Shared:
         if cut is not None:
             more = np.concatenate([np.arange(len(of)), cut.extra])
             of, other, numbers = of[more], other[more], numbers[more]
+            opposed = opposed[more]
             cross = np.concatenate([cross, np.zeros((len(cut.extra), *cross.shape[1:]))])
         mass = total[:, :, :a]
         least = HARDLY if pair.areas is None else 0.0
@@ -101,7 +106,8 @@ class Shared:
         even = sharing_functions(kept, slave.real[facets])
         covered = mass.sum(axis=(1, 2)) / whole[facets]
         covered = np.where(np.abs(covered - 1) < ROUNDING, 1.0, covered)
-        return cls(of, other, facets, numbers, total, cross, psi, kept, even, covered, cut)
+        return cls(of, other, facets, numbers, total, cross, psi, kept, even, covered, opposed,
+                   cut)  # fmt: skip
 
     @property
     def mass(self) -> Array:
