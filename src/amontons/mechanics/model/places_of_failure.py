@@ -64,14 +64,17 @@ def _hanging(here: MortarMeeting, bears: Mask) -> int | None:
     """
     skin, shared = here.pair.slave, here.shared
     rows = np.flatnonzero(bears & here.met)
-    bearing, ending = np.zeros((2, len(here.x)), dtype=bool)
+    bearing, ending, outer = np.zeros((3, len(here.x)), dtype=bool)
     bearing[here.slaves[rows]] = True
     whole = np.zeros(len(skin.nodes), dtype=bool)
     whole[shared.facets] = shared.covered >= 1
     if (whole & bearing[skin.nodes].all(axis=1)).any():
         return None
     ending[skin.rim] = True
-    ending[skin.nodes[~whole]] = True
+    master = here.pair.master
+    last = np.isin(master.nodes[shared.master], master.rim).any(axis=1)
+    outer[skin.nodes[shared.slave[last]]] = True  # who faces the master's last facets
+    ending[np.intersect1d(skin.nodes[~whole], np.flatnonzero(outer))] = True
     return int(rows[0]) if len(rows) and ending[bearing].all() else None
 
 
