@@ -88,6 +88,33 @@ def test_sides_of_an_outside():
     assert set(over[one]) == set(np.flatnonzero(slot & (fold.side == 0)))
 
 
+@pytest.mark.parametrize(
+    ("count", "bend", "gap"), [(48, 0.8, 0.1), (64, 0.8, 0.1), (96, 1.2, 0.08)]
+)
+def test_what_is_all_but_in_contact_is_of_one_side_as_far_as_it_goes(count, bend, gap):
+    """A ring crushed to two lobes: flanks of the neck see the lobes' far ends, too.
+
+    These came before neighbours, so that sides in contact changed from step to step.
+    """
+    angle = 2 * np.pi * (np.arange(count) + 0.5) / count
+    unit = np.stack([np.cos(angle), np.sin(angle)], axis=1)
+    i = np.arange(count)
+    j = (i + 1) % count
+    quads = am.Cells("quad", np.stack([i, i + count, j + count, j], axis=1))
+    mesh = am.Mesh(np.concatenate([unit, 1.2 * unit]), (quads,))
+    inner = mesh.boundary[0].nodes
+    skin = Skin.of((Facets("line", inner[(inner < count).all(axis=1)]),), 0)
+    wide = 1.3 * unit[:, 0]
+    crushed = np.stack([wide, unit[:, 1] * (gap + bend * wide**2)], axis=1)
+    there = np.roll(crushed, -1, axis=0) - np.roll(crushed, 1, axis=0)
+    out = there[:, ::-1] * (1, -1) / np.linalg.norm(there, axis=1)[:, None]
+    side = Fold.of(skin, mesh.points).at(np.concatenate([crushed, crushed + 0.1 * out])).side
+    neck = np.abs(crushed[skin.nodes].mean(axis=1)[:, 0]) < 0.35
+    upper = unit[skin.nodes].mean(axis=1)[:, 1] > 0
+    assert len(set(side[neck & upper])) == 1
+    assert set(side[neck & ~upper]) == {1 - side[neck & upper][0]}
+
+
 def test_a_folded_beam_is_as_with_two_surfaces():
     """Arms of a hairpin, pressed together and pulled along each other."""
     def along(x, t):

@@ -288,6 +288,9 @@ def test_problems_of_steps_are_fclib_files(tmp_path):
 @pytest.mark.parametrize(
     ("make", "words"),
     [
+        (lambda: MoreauJean(step=[]), r"step: expected a number > 0, got \[\]"),
+        (lambda: MoreauJean(0.1, restitution="1"), "restitution: .* from 0 to 1"),
+        (lambda: QuasiStatic([]), r"step: expected a number > 0, got \[\]"),
         (lambda: MoreauJean(step=0), "step: expected a number > 0"),
         (lambda: MoreauJean(step=1, theta=0.4), "theta: .* from 1/2 to 1"),
         (lambda: MoreauJean(step=1, restitution=1.1), "restitution"),
@@ -295,6 +298,7 @@ def test_problems_of_steps_are_fclib_files(tmp_path):
         (lambda: MoreauJean(step=1, mass_damping=-1), "mass_damping"),
         (lambda: QuasiStatic(step=float("nan")), "step: expected a number > 0"),
         (lambda: next(evolve(thrown(), MoreauJean(step=1), until=-1)), "until"),
+        (lambda: next(evolve(thrown(), MoreauJean(step=1), until=[])), r"until: .*got \[\]"),
         (
             lambda: next(
                 evolve(thrown(), MoreauJean(step=1), until=1, start=at_rest(thrown(cells=2)))

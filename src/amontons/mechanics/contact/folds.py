@@ -5,8 +5,10 @@ other and they overlap seen along the normals; at most FAR of their radii away. 
 share a node do not, nor do those that see each other through the body, whose depth below each
 facet is known of the undeformed state.  Two sides of a gap shall get different sides of
 contact, and facets beside each other the same one.  Both at once is not always possible (where
-a fold ends): pairs are heeded in the order of their distance, then neighbours, each unless what
-was decided before contradicts: a spanning tree of least weight, coloured from its first facet.
+a fold ends): pairs are heeded in the order of their distance, neighbours in that of the farther
+one's distance from what it faces, each unless what was decided before contradicts: a spanning
+tree of least weight, coloured from its first facet.  So what is in contact is of one side as
+far as it goes, whatever it sees far away; else sides there would change as bodies move on.
 Nodes of facets of both sides carry no force of their own.
 
 The sides are those of the positions at the beginning of a step, so that they do not change
@@ -59,17 +61,36 @@ class Fold:
         """The same with the sides of the positions x (nodes, d)."""
         one, other, apart, takes_part = self._facing(x)
         beside = self._beside
-        order = np.lexsort((other, one, apart))
-        rows = np.concatenate([one[order], beside[0]])
-        columns = np.concatenate([other[order], beside[1]])
+        distance = np.concatenate([apart, self._apart_as(x, one, other, apart)])
+        rows = np.concatenate([one, beside[0]])
+        columns = np.concatenate([other, beside[1]])
+        unlike = np.arange(len(rows)) < len(one)
+        order = np.lexsort((columns, rows, ~unlike, distance))
+        rows, columns, unlike = rows[order], columns[order], unlike[order]
         rank = np.arange(1, len(rows) + 1)  # none twice: one tree of least weight
         f = len(self.skin.nodes)
         tree = sparse.csgraph.minimum_spanning_tree(
             sparse.csr_array(sparse.coo_array((rank, (rows, columns)), shape=(f, f)))
         ).tocoo()
-        differs = sparse.coo_array((tree.data <= len(one), (tree.row, tree.col)), shape=(f, f))
+        differs = sparse.coo_array(
+            (unlike[tree.data.astype(np.int64) - 1], (tree.row, tree.col)), shape=(f, f)
+        )
         side = _coloured(sparse.csr_array(tree), sparse.csr_array(differs))
         return replace(self, side=np.where(takes_part, side, NEITHER))
+
+    def _apart_as(self, x: Array, one: Index, other: Index, apart: Array) -> Array:
+        """Distances at which neighbours are heeded, (k,) of `_beside`; infinite: last.
+
+        That of the farther one of both from what it faces; more the more they are bent.
+        """
+        near = np.full(len(self.skin.nodes), np.inf)
+        np.minimum.at(near, one, apart)
+        np.minimum.at(near, other, apart)
+        first, second = self._beside
+        _, normal, _ = shapes(self.skin, x)
+        flat = np.maximum((1 + (normal[first] * normal[second]).sum(axis=1)) / 2, 0)
+        with np.errstate(divide="ignore", invalid="ignore"):
+            return np.maximum(near[first], near[second]) / flat
 
     def _facing(self, x: Array) -> tuple[Index, Index, Array, Mask]:
         """Pairs of facets (k,), (k,), every pair once, that face each other; their distance.

@@ -14,6 +14,7 @@ from .coefficients import like_percent
 from .deep_masters import deep_masters
 from .fields import ContactFields
 from .held_facets import held_facets
+from .held_friction import held_friction
 from .loading import no_load
 from .locking import volumetric_locking
 from .matching import nodal_on_non_matching
@@ -36,7 +37,7 @@ CHECKS: tuple[Check, ...] = (
 )
 AT_FIRST = (overlap_at_start,)  # of how bodies are given: said once
 OF_THE_START = (sliding_beyond_pairs, sliding_beyond_curvature)  # its pairs, normals
-OF_WHERE_NODES_ARE = (held_facets, deep_masters, unfaced_slaves)  # where pairs are found there
+OF_WHERE_NODES_ARE = (held_facets, held_friction, deep_masters, unfaced_slaves)  # found there
 OF_MOTIONS = (large_rotation, *OF_THE_START, *OF_WHERE_NODES_ARE)
 
 

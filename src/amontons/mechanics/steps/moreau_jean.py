@@ -44,6 +44,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 from functools import cached_property
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -59,6 +60,7 @@ from ...solvers.contract import Iterate
 from ..model import Model
 from ..model.large_deformation import LargeDeformation
 from ..model.reactions import support_forces
+from ..model.values import is_number
 from .bolts import lock_times
 from .energy import Energies
 from .impulses import Shifts
@@ -94,12 +96,12 @@ class MoreauJean:
     condense: bool = True  # form W once where it fits into memory; it pays after a few steps
 
     def __post_init__(self) -> None:
-        _expect("step", self.step, self.step > 0, "> 0")
-        _expect("theta", self.theta, 0.5 <= self.theta <= 1, "from 1/2 to 1")
-        _expect("restitution", self.restitution, 0 <= self.restitution <= 1, "from 0 to 1")
-        _expect("prediction", self.prediction, 0 <= self.prediction <= 1, "from 0 to 1")
+        _expect("step", self.step, lambda step: step > 0, "> 0")
+        _expect("theta", self.theta, lambda theta: 0.5 <= theta <= 1, "from 1/2 to 1")
+        for name in ("restitution", "prediction"):
+            _expect(name, getattr(self, name), lambda part: 0 <= part <= 1, "from 0 to 1")
         for name in ("reach", "mass_damping", "stiffness_damping"):
-            _expect(name, getattr(self, name), getattr(self, name) >= 0, ">= 0")
+            _expect(name, getattr(self, name), lambda value: value >= 0, ">= 0")
 
         if self.reach > 0 and self.restitution > 0:
             raise InvalidInput(
@@ -285,6 +287,6 @@ def _rows_of(contacts: Index, d: int) -> Index:
     return (contacts[:, None] * d + np.arange(d)).ravel()
 
 
-def _expect(name: str, value: float, good: bool, wanted: str) -> None:
-    if not (np.isfinite(value) and good):
+def _expect(name: str, value: object, good: Callable[[Any], bool], wanted: str) -> None:
+    if not (is_number(value) and np.isfinite(value) and good(value)):  # type: ignore[call-overload]
         raise InvalidInput(f"expected a number {wanted}, got {value!r}", (name,))

@@ -24,6 +24,7 @@ from ...problem.nitsche import NitscheProblem
 from ...problem.protocol import Problem
 from ..model import Model
 from ..model.large_deformation import LargeDeformation
+from ..model.values import is_number
 from ..model.yielding import YieldingProblem
 from .bolts import Tightened, lock_times
 from .large_steps import LargeSlowModel
@@ -50,7 +51,7 @@ class QuasiStatic:
     crossing: Crossing | None = None
 
     def __post_init__(self) -> None:
-        if not (np.isfinite(self.step) and self.step > 0):
+        if not (is_number(self.step) and np.isfinite(self.step) and self.step > 0):
             raise InvalidInput(f"expected a number > 0, got {self.step!r}", ("step",))
         if self.crossing is not None and not hasattr(self.crossing, "between"):
             raise InvalidInput(

@@ -15,6 +15,7 @@ from ...problem.solution import FrictionSolution
 from ...solvers.contract import Iterate, Solver, check_at_least, check_solves, taken_by
 from ...solvers.driver import drive
 from ..model import Model
+from ..model.values import is_number
 from .moreau_jean import Local, MoreauJean
 from .quasi_static import QuasiStatic
 from .schedule import Schedule, Stage, carried_over
@@ -141,5 +142,6 @@ def _check(state: State, motion: Motion, step: float, until: float) -> None:
                 f"start: expected {name} of shape {wanted}, got {found}: "
                 "it belongs to another model"
             )
-    if not (np.isfinite(until) and until > state.time - WHOLE * step):
+    ahead = is_number(until) and np.isfinite(until) and until > state.time - WHOLE * step
+    if not ahead:
         raise InvalidInput(f"until: expected a time after {state.time:g}, got {until!r}")

@@ -1,0 +1,74 @@
+"""A doubt about contact where nodes are: supports hold sliding contacts along the surface.
+
+Along components that supports prescribe a contact of finite kinematics has no friction
+(`contact.current`): what it would be is part of a reaction that nobody knows, so that neither
+the slave nor its master get it.  Small kinematics has it there.  Nothing is missing where the
+sides do not move on each other, as in planes of symmetry.
+"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ...core.warned import ResultWarning
+from .fields import ContactFields
+from .laws import rubs
+from .nonlinear_parts import nonlinear_parts
+
+if TYPE_CHECKING:
+    from .model import Model
+
+Array = NDArray[np.float64]
+MISSING = 0.01  # part of what friction may bear in a pair, missing, that is told
+
+
+def held_friction(model: Model, fields: ContactFields) -> list[ResultWarning]:
+    """Pairs whose friction is notably less for want of that along held components."""
+    displacement = np.concatenate(fields.displacement)
+    contact = nonlinear_parts(model).contact
+    if contact.free.all() or not np.isfinite(displacement).all():
+        return []
+    missing, bound = _missing(model, fields, displacement)
+    out, start = [], 0
+    for k, pair in enumerate(contact.pairs):
+        mine = slice(start, start + len(pair.slaves))
+        start = mine.stop
+        most, lost = bound[mine].sum(), missing[mine]
+        if lost.sum() > MISSING * most:
+            worst = fields.points[mine][int(lost.argmax())]
+            out.append(_warning(model, k, int((lost > 0).sum()), lost.sum() / most, worst))
+    return out
+
+
+def _missing(model: Model, fields: ContactFields, displacement: Array) -> tuple[Array, Array]:
+    """(friction missing for supports, the most that friction bears), forces (nc,).
+
+    Of a contact that moves by s along components that are held what is missing is at most the
+    force that its body answers s with, rho |s|, as a contact that sticks shows.
+    """
+    parts = nonlinear_parts(model)
+    contact = parts.contact
+    r = np.c_[fields.pressure, fields.shear] * fields.weights[:, None]
+    law = contact.law
+    bound = np.where((r[:, 0] > 0) & rubs(law) & ~law.tied, law.bound(r), 0.0)
+    motion = contact.meet(parts.X + displacement).relative(displacement)
+    normal = fields.frames[:, 0]
+    along = motion - (motion * normal).sum(axis=1)[:, None] * normal
+    held = np.linalg.norm(np.where(contact.free, 0.0, along), axis=1)
+    return np.minimum(bound, contact.rho * held), bound
+
+
+def _warning(model: Model, k: int, count: int, part: float, at: Array) -> ResultWarning:
+    contact = model.contacts[k]
+    other = "" if contact.master is None else f" with {contact.master!r}"
+    cure = "" if contact.master is None else ", or take the other surface as the slave"
+    return ResultWarning(
+        "held-without-friction",
+        f"contact on {contact.slave!r}{other}: supports hold {count} of its contacts along the "
+        f"surface on which they slide, as at [{', '.join(f'{c:.6g}' for c in at)}]; these have "
+        f"no friction with kinematics 'finite', and about {100 * part:.2g} % of what "
+        f"friction bears is missing; hold the body elsewhere{cure}",
+    )
