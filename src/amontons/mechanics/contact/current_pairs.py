@@ -26,6 +26,7 @@ from .carried import TiedMeeting, TiedPair
 from .current_mortar import MortarMeeting, MortarPair
 from .fading import Fading, Mixture
 from .geometry import Obstacle, frames
+from .grown_areas import GrownAreas
 from .surface_axes import carried_frames
 
 Array = NDArray[np.float64]
@@ -50,17 +51,41 @@ class Pair(Protocol):
 class Meeting:
     """A pair with an obstacle `side` at some positions.
 
-    slaves (nc,): nodes; x (nc, d): where the slaves are; nodes: of the model; offset (nc,): of
-    the gaps; axes, along: of `Meetings`, None for none.
+    slaves (nc,): nodes; positions (nodes, d): of all nodes; offset (nc,): of the gaps; axes,
+    along: of `Meetings`, None for none; areas: around the slaves, None where they stay.
     """
 
     side: Obstacle
     slaves: Index
-    x: Array
-    nodes: int
+    positions: Array
     offset: Array | float = 0.0
     axes: sparse.csr_array | None = None
     along: Array | None = None
+    areas: GrownAreas | None = None
+
+    @cached_property
+    def x(self) -> Array:
+        """Where the slaves are, (nc, d)."""
+        return self.positions[self.slaves]
+
+    @property
+    def nodes(self) -> int:
+        """Of the model."""
+        return len(self.positions)
+
+    @cached_property
+    def growth(self) -> Array:
+        """(1) of `grown_areas`, (nc,)."""
+        if self.areas is None:
+            return np.ones(len(self.slaves))
+        return self.areas.at(self.positions)
+
+    @property
+    def growth_slopes(self) -> sparse.csr_array:
+        """Of these, (nc, nodes d)."""
+        if self.areas is None:
+            return sparse.csr_array((len(self.slaves), self.positions.size))
+        return self.areas.slopes(self.positions)
 
     @property
     def met(self) -> Mask:
@@ -105,18 +130,20 @@ class ObstaclePair:
     """Slave nodes (nc,) of the model in front of an obstacle; offset (nc,): of their gaps.
 
     axes (2 nc, nodes): c of `surface_axes`, of tangents that the slave carries; None for none.
+    areas: around the slaves, None where they stay.
     """
 
     obstacle: Obstacle
     slaves: Index
     offset: Array | float = 0.0
     axes: sparse.csr_array | None = None
+    areas: GrownAreas | None = None
 
     def at(self, positions: Array) -> Meeting:
         """The slaves and where they are."""
         along = None if self.axes is None else (self.axes @ positions).reshape(-1, 2, 3)
-        return Meeting(self.obstacle, self.slaves, positions[self.slaves], len(positions),
-                       self.offset, self.axes, along)  # fmt: skip
+        return Meeting(self.obstacle, self.slaves, positions, self.offset, self.axes, along,
+                       self.areas)  # fmt: skip
 
 
 @dataclass(frozen=True, eq=False)
@@ -175,6 +202,11 @@ class Meetings:
     def met(self) -> Mask:
         """Contacts that meet their other side, (nc,); the others are open."""
         return np.concatenate([part.met for part in self.parts])
+
+    @cached_property
+    def growth(self) -> Array:
+        """Areas that stresses act on over the undeformed ones, (nc,), of `grown_areas`."""
+        return np.concatenate([part.growth for part in self.parts])
 
     @cached_property
     def passed(self) -> Array:
