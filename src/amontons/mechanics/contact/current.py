@@ -90,18 +90,13 @@ class CurrentContact:
 
     @cached_property
     def give(self) -> Array:
-        """C, (nc,), length per force."""
+        """C and C_T, (nc, 2), length per force."""
         give = self.law.give
-        return np.zeros(len(self.rho)) if give is None else give[:, 0]
+        return np.zeros((len(self.rho), 2)) if give is None else give[:, :2]
 
     def meet(self, positions: Array) -> Meetings:
         """Where the pairs meet at the positions (nodes, d) of all nodes."""
         return Meetings([pair.at(positions) for pair in self.pairs])
-
-    def _mixed(self, force: Array, motion: Array, meeting: Meetings) -> Mixture | None:
-        """What nodes that hardly anything faces have in the place of gap and motion."""
-        offset = np.broadcast_to(self.law.offset, len(force))
-        return meeting.mixture(force, motion, (self.rho, self.give, offset), self.free)
 
     def local(
         self, force: Array, motion: Array, meeting: Meetings, drawn: Array | None = None,
@@ -115,7 +110,7 @@ class CurrentContact:
         """
         own, axes = self.over(meeting), meeting.frames
         force, motion = force * self.free, motion * self.free
-        mixed = own._mixed(force, motion, meeting)
+        mixed = meeting.mixture(own, force, motion, drawn)
         r = np.einsum("pkc,pc->pk", axes, force)
         u = np.einsum("pkc,pc->pk", axes, motion if mixed is None else mixed.motion)
         if play is not None:
@@ -123,7 +118,8 @@ class CurrentContact:
             u[:, 1:] += (1 - left(z, own.rho * play))[:, None] * z / own.rho[:, None]
         u[:, 0] = meeting.gap if mixed is None else mixed.gap
         if drawn is not None:
-            u[:, 1:] += still_drawn(drawn, axes, self.free)
+            part = 1.0 if mixed is None else mixed.weights[:, None]
+            u[:, 1:] += part * still_drawn(drawn, axes, self.free)
         return r, u, axes
 
     def at(
@@ -132,7 +128,7 @@ class CurrentContact:
     ) -> ContactPoint:  # fmt: skip
         """The law at forces lambda and motions s, both (nc, d), where the pairs meet."""
         own, force, motion = self.over(meeting), force * self.free, motion * self.free
-        mixed = own._mixed(force, motion, meeting)
+        mixed = meeting.mixture(own, force, motion, drawn)
         if mixed is not None:
             motion = mixed.motion
         known = own, force, motion, meeting, mixed
@@ -175,7 +171,7 @@ class ContactPoint:
     @cached_property
     def _stiffness_left(self) -> Array:
         """1 - rho C, (nc,): z_N by lambda . n."""
-        return 1.0 - self.contact.rho * self.contact.give
+        return 1.0 - self.contact.rho * self.contact.give[:, 0]
 
     @property
     def tied(self) -> NDArray[np.bool_]:
@@ -213,7 +209,7 @@ class ContactPoint:
     def z_normal(self) -> Array:
         """z_N, (nc,): positive where closed; negative where nobody is met."""
         along = (self.n * self.force).sum(axis=1)
-        apart = self.gap + self.contact.give * along + self.contact.law.offset
+        apart = self.gap + self.contact.give[:, 0] * along + self.contact.law.offset
         apart = self.contact.rho * apart
         closed = along + self.cohesion - apart
         return np.where(self.meeting.met, closed, -np.abs(along) - np.abs(apart))

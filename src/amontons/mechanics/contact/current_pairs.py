@@ -15,7 +15,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
-from typing import Any, Protocol
+from typing import TYPE_CHECKING, Any, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
@@ -28,6 +28,9 @@ from .fading import Fading, Mixture
 from .geometry import Obstacle, frames
 from .grown_areas import GrownAreas
 from .surface_axes import carried_frames
+
+if TYPE_CHECKING:
+    from .current import CurrentContact
 
 Array = NDArray[np.float64]
 Index = NDArray[np.int64]
@@ -239,12 +242,9 @@ class Meetings:
         return [part.fading if isinstance(part, MortarMeeting) else None for part in self.parts]
 
     def mixture(
-        self, force: Array, motion: Array, numbers: tuple[Array, Array, Array], free: Mask
+        self, contact: CurrentContact, force: Array, motion: Array, drawn: Array | None
     ) -> Mixture | None:
-        """Of `fading` at forces and motions (nc, d); None where nothing fades.
-
-        numbers: rho, C and o, (nc,) each; free (nc, d).
-        """
+        """Of `fading` at forces and motions (nc, d), q drawn (nc, d-1); None: nothing fades."""
         parts = self._fading
         if not any(parts):
             return None
@@ -255,7 +255,10 @@ class Meetings:
             if fading is not None:
                 weights[mine] = fading.weights
                 passed[mine] = fading.shares @ force[mine]
-        return Mixture(weights, passed, *numbers, free, force, motion, self.gap, self.normals)
+        if drawn is not None:
+            drawn = np.einsum("pk,pkc->pc", drawn, self.frames[:, 1:]) * contact.free
+        return Mixture(weights, passed, contact.rho, contact.give, contact.law.offset,
+                       contact.free, force, motion, self.gap, self.normals, drawn)  # fmt: skip
 
     @cached_property
     def shares(self) -> sparse.csr_array:

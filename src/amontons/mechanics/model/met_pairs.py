@@ -54,7 +54,7 @@ def met_pairs(model: Model, slaves: list[Index], linear: Discretisation) -> list
             skins.append(Skin.of(facets, int(linear.offsets[k]) // d))
             meshes.append((model.bodies[k].mesh, name))
         names = (contact.slave, ", ".join(contact.masters))
-        # a given bound does not fade with the pressure: nodes drop out with it
+        # a given bound follows the area that is faced, whatever the pressure
         fades = not contact.tied and contact.tresca is None
         areas = areas_around(skins[0], nodes, X) if fades else None
         whole = own.rows.weights
