@@ -83,6 +83,15 @@ class Problem(KeepsLocks):
         """(u, v) of a state; without v as its reactions move it, or as well as is known."""
         raise NotImplementedError
 
+    def growth(self, v: Array | None) -> Array | float:
+        """Areas that stresses of the law act on at a state, over those it knows, (nc,) or 1."""
+        return 1.0
+
+    def law_at(self, v: Array | None) -> Law:
+        """The law with its stresses on the areas of a state."""
+        grown = self.growth(v)
+        return self.law if isinstance(grown, float) else self.law.scaled(grown)
+
     # ---------------------------------------------------------------- sizes, beginning
     @property
     def kind(self) -> type[Problem]:
@@ -156,7 +165,7 @@ class Problem(KeepsLocks):
         self, r: Array, v: Array | None, error: float, tolerance: float
     ) -> Accepted:
         """A state whose error is below the tolerance, with reactions that keep to statuses."""
-        moved, told = settled(self.law, self.rho, r, lambda r: self.motion(r, v))
+        moved, told = settled(self.law_at(v), self.rho, r, lambda r: self.motion(r, v))
         if told.r is not r:
             r, error = told.r, self.error(told.r, v)
         weakest = self.weakest(r, v) if error <= tolerance else None

@@ -149,7 +149,7 @@ def varying_law(problem: Any, given: Asked, start: Any, solve: Solve) -> Frictio
         options = replace(given, tolerance=goal, max_iterations=left)
         found = solve(problem.with_law(way.fixed), options, start)
         rounds.append(found)
-        change = way.changes(found.r, found.u)
+        change = way.changes(_undeformed(problem, found), found.u)
         error, weakest = _judged(problem, found)
         ended = _ended(given, found, error, weakest, goal, change, way, rounds)
         if ended is not None:
@@ -171,13 +171,23 @@ def _relaxation(weight: float, change: Array, last: Array) -> float:
 def _state(problem: Any, start: Any) -> tuple[Array, Array]:
     """(r, u) of a start."""
     r, v = problem.start(start)
-    return r, problem.motion(r, v)[0]
+    return _over(r, problem.growth(v)), problem.motion(r, v)[0]
+
+
+def _undeformed(problem: Any, found: FrictionSolution) -> Array:
+    """r of a solution whose pressures are those on areas that have not grown, (nc, d)."""
+    return _over(found.r, problem.growth(found.v if problem.has_v else None))
+
+
+def _over(r: Array, growth: Array | float) -> Array:
+    """r (nc, d) over the growth of areas, (nc,) or 1."""
+    return np.asarray(r / np.reshape(growth, (-1, 1)))
 
 
 def _judged(problem: Any, found: FrictionSolution) -> tuple[float, Any]:
     """The error of the whole, and its weakest contact where it may decide."""
     v = found.v if problem.has_v else None
-    known = problem.with_law(problem.law.frozen(found.r, found.u))
+    known = problem.with_law(problem.law.frozen(_undeformed(problem, found), found.u))
     return known.error(found.r, v), known.weakest(found.r, v)
 
 
@@ -231,7 +241,9 @@ def _whole(
         contact_tolerance=given.of_contacts,
     )  # fmt: skip
     own: Any = found.problem
-    frozen = replace(own, law=problem.law.frozen(found.r, found.u))
+    grown = problem.growth(found.v if problem.has_v else None)
+    frozen = problem.law.frozen(_over(found.r, grown), found.u).scaled(grown)
+    frozen = replace(own, law=frozen)
     return replace(found, problem=frozen, convergence=record, follows=problem.law)
 
 

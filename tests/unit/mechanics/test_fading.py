@@ -131,8 +131,11 @@ def test_the_tangent_of_what_fades_is_exact(dim, more):
     fixed = np.ones(parts.X.size, dtype=bool)
     fixed[parts.free] = False
     start = u.ravel()
-    problem = large_step(model, np.zeros(len(start)), np.where(fixed, start, 0.0),
-                         start + 0.004 * rng.standard_normal(len(start)))  # fmt: skip
+    before = start + 0.004 * rng.standard_normal(len(start))
+    springs = more is not None and "stick_stiffness" in more
+    drawn = 0.004 * rng.standard_normal((len(parts.at), dim - 1)) if springs else None
+    problem = large_step(model, np.zeros(len(start)), np.where(fixed, start, 0.0), before,
+                         drawn=drawn)  # fmt: skip
     draws = [(start[parts.free] + 0.004 * one, 0.01 * other)
              for one, other in rng.standard_normal((4, 2, problem.unknowns))]  # fmt: skip
     assert all(problem.contact_point(v).mixed is not None for v, _ in draws)

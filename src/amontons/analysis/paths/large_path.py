@@ -179,7 +179,7 @@ class LargePath(ABC):
         """The point as a solution of its tangent problem, with the judge's error."""
         problem, began = self.at(p), now()
         u = problem.local_velocity(y)
-        told = settle(problem.law, problem.rho, problem.reactions(y), u)
+        told = settle(problem.law_at(y), problem.rho, problem.reactions(y), u)
         error = problem.error(told.r, y)
         record = judged(error, problem.measure, now() - began)
         tangent = problem.recover(told.r, y)[0]

@@ -132,6 +132,11 @@ class TiedMeeting:
         return np.ones(len(self.slaves), dtype=bool)
 
     @property
+    def growth(self) -> Array:
+        """Of `grown_areas`, (nc,): bonds keep their area."""
+        return np.ones(len(self.slaves))
+
+    @property
     def passed(self) -> Array:
         """How much of lambda_p all nodes of the slave's side get, (nc,)."""
         return self.pair.passed

@@ -31,7 +31,7 @@ surface, are `framed_point`.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
@@ -43,12 +43,11 @@ from ...problem.law.states import OPEN, SLIP, STICK
 from .closing import left, slope_of_left
 from .current_pairs import Meetings, Pair
 from .fading import Mixture
+from .pieces import BACK, Pieces, slides, tangents
 from .surface_axes import still_drawn
 
 Array = NDArray[np.float64]
-Pieces = NDArray[np.int8]
 Partials = tuple[Array, Array, Array, Array, Array | None]
-BACK = 3  # beside the statuses: slip against t, 2D only
 
 
 @dataclass(frozen=True, eq=False)
@@ -62,6 +61,18 @@ class CurrentContact:
     law: Law
     rho: Array
     free: NDArray[np.bool_]
+
+    def over(self, meeting: Meetings) -> CurrentContact:
+        """The contact whose stresses act on the areas of a meeting, see `grown_areas`."""
+        if not self.law.has_stresses:
+            return self
+        grown = meeting.growth
+        return replace(self, law=self.law.scaled(grown), rho=self.rho * grown)
+
+    def law_at(self, meeting: Meetings) -> Law:
+        """The law on areas of now, without what holds contacts that meet nobody any more."""
+        law = self.over(meeting).law
+        return law if meeting.met.all() else law.lost(~meeting.met)
 
     @cached_property
     def framed(self) -> bool:
@@ -79,18 +90,13 @@ class CurrentContact:
 
     @cached_property
     def give(self) -> Array:
-        """C, (nc,), length per force."""
+        """C and C_T, (nc, 2), length per force."""
         give = self.law.give
-        return np.zeros(len(self.rho)) if give is None else give[:, 0]
+        return np.zeros((len(self.rho), 2)) if give is None else give[:, :2]
 
     def meet(self, positions: Array) -> Meetings:
         """Where the pairs meet at the positions (nodes, d) of all nodes."""
         return Meetings([pair.at(positions) for pair in self.pairs])
-
-    def _mixed(self, force: Array, motion: Array, meeting: Meetings) -> Mixture | None:
-        """What nodes that hardly anything faces have in the place of gap and motion."""
-        offset = np.broadcast_to(self.law.offset, len(force))
-        return meeting.mixture(force, motion, (self.rho, self.give, offset), self.free)
 
     def local(
         self, force: Array, motion: Array, meeting: Meetings, drawn: Array | None = None,
@@ -102,17 +108,18 @@ class CurrentContact:
         were drawn at the end of the last step, in the frames, a part of the slip; play (nc,):
         a, which is none.
         """
-        axes = meeting.frames
+        own, axes = self.over(meeting), meeting.frames
         force, motion = force * self.free, motion * self.free
-        mixed = self._mixed(force, motion, meeting)
+        mixed = meeting.mixture(own, force, motion, drawn)
         r = np.einsum("pkc,pc->pk", axes, force)
         u = np.einsum("pkc,pc->pk", axes, motion if mixed is None else mixed.motion)
         if play is not None:
-            z = r[:, 1:] - self.rho[:, None] * u[:, 1:]
-            u[:, 1:] += (1 - left(z, self.rho * play))[:, None] * z / self.rho[:, None]
+            z = r[:, 1:] - own.rho[:, None] * u[:, 1:]
+            u[:, 1:] += (1 - left(z, own.rho * play))[:, None] * z / own.rho[:, None]
         u[:, 0] = meeting.gap if mixed is None else mixed.gap
         if drawn is not None:
-            u[:, 1:] += still_drawn(drawn, axes, self.free)
+            part = 1.0 if mixed is None else mixed.weights[:, None]
+            u[:, 1:] += part * still_drawn(drawn, axes, self.free)
         return r, u, axes
 
     def at(
@@ -120,11 +127,11 @@ class CurrentContact:
         play: Array | None = None,
     ) -> ContactPoint:  # fmt: skip
         """The law at forces lambda and motions s, both (nc, d), where the pairs meet."""
-        force, motion = force * self.free, motion * self.free
-        mixed = self._mixed(force, motion, meeting)
+        own, force, motion = self.over(meeting), force * self.free, motion * self.free
+        mixed = meeting.mixture(own, force, motion, drawn)
         if mixed is not None:
             motion = mixed.motion
-        known = self, force, motion, meeting, mixed
+        known = own, force, motion, meeting, mixed
         if not self.framed:
             return ContactPoint(*known, play)
         from .framed_point import FramedPoint  # which is a ContactPoint
@@ -164,7 +171,7 @@ class ContactPoint:
     @cached_property
     def _stiffness_left(self) -> Array:
         """1 - rho C, (nc,): z_N by lambda . n."""
-        return 1.0 - self.contact.rho * self.contact.give
+        return 1.0 - self.contact.rho * self.contact.give[:, 0]
 
     @property
     def tied(self) -> NDArray[np.bool_]:
@@ -202,7 +209,7 @@ class ContactPoint:
     def z_normal(self) -> Array:
         """z_N, (nc,): positive where closed; negative where nobody is met."""
         along = (self.n * self.force).sum(axis=1)
-        apart = self.gap + self.contact.give * along + self.contact.law.offset
+        apart = self.gap + self.contact.give[:, 0] * along + self.contact.law.offset
         apart = self.contact.rho * apart
         closed = along + self.cohesion - apart
         return np.where(self.meeting.met, closed, -np.abs(along) - np.abs(apart))
@@ -240,7 +247,7 @@ class ContactPoint:
     def along(self) -> Array:
         """2D: component of z_T along the tangent t of `frames`, (nc,); its length in 3D."""
         if self.n.shape[1] == 2:
-            return (self.z_tangent * _tangents(self.n)).sum(axis=1)
+            return (self.z_tangent * tangents(self.n)).sum(axis=1)
         return np.linalg.norm(self.z_tangent, axis=1)
 
     @cached_property
@@ -281,10 +288,10 @@ class ContactPoint:
         bound = self._bound(closed)
         if self.n.shape[1] == 2:
             sign = np.select([kind == SLIP, kind == BACK], [1.0, -1.0], 0.0)
-            slip = (sign * bound)[:, None] * _tangents(self.n)
+            slip = (sign * bound)[:, None] * tangents(self.n)
         else:
             length = np.where(self.along > 0, self.along, 1.0)
-            slip = (np.where(_slides(kind), bound, 0.0) / length)[:, None] * self.z_tangent
+            slip = (np.where(slides(kind), bound, 0.0) / length)[:, None] * self.z_tangent
         stuck = (kind == STICK)[:, None] * self.z_tangent
         return self._with_ties(self.force - normal - self._released(slip + stuck))
 
@@ -370,10 +377,10 @@ class ContactPoint:
         """Derivatives of P by z_T, (nc, d, d), and by the bound, (nc, d)."""
         d, kind = self.n.shape[1], pieces % 4
         in_z = np.where((kind == STICK)[:, None, None], np.eye(d), 0.0)
-        slip = _slides(kind)
+        slip = slides(kind)
         if d == 2:
             sign = np.where(kind == SLIP, 1.0, -1.0)
-            return in_z, np.where(slip, sign, 0.0)[:, None] * _tangents(self.n)
+            return in_z, np.where(slip, sign, 0.0)[:, None] * tangents(self.n)
         length = np.where(self.along > 0, self.along, 1.0)
         s = self.z_tangent / length[:, None]
         bound = self._bound((pieces > 0) & (pieces < 4))
@@ -386,14 +393,4 @@ class ContactPoint:
         kind = pieces % 4
         sign = np.select([kind == SLIP, kind == BACK], [1.0, -1.0], 0.0)
         size = sign * self._bound((pieces > 0) & (pieces < 4))
-        return -size[:, None, None] * self.n[:, :, None] * _tangents(self.n)[:, None, :]
-
-
-def _slides(kind: Pieces) -> NDArray[np.bool_]:
-    """Pieces SLIP and BACK, (nc,)."""
-    return (kind == SLIP) | (kind == BACK)
-
-
-def _tangents(n: Array) -> Array:
-    """t of `frames` in 2D, (nc, 2)."""
-    return np.stack([n[:, 1], -n[:, 0]], axis=1)
+        return -size[:, None, None] * self.n[:, :, None] * tangents(self.n)[:, None, :]

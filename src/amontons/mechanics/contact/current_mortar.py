@@ -68,6 +68,7 @@ from .faced_normals import FacedNormals
 from .facing import Skin, shapes
 from .fading import Fading
 from .folds import Fold
+from .grown_areas import LEAST
 from .newcomers import Newcomers
 from .shared import Shared
 
@@ -86,7 +87,8 @@ class MortarPair:
     slave and master are then, and all nodes of which have a row.  offset (nc,): what is added
     to gaps, of a clearance that is not that of the meshes.  axes (2 nc, nodes): c of
     `surface_axes`, of tangents that the slave carries; None for none.  areas (nc,): undeformed,
-    around the slaves, of `fading`; None: nodes that hardly anything faces drop out.
+    around the slaves, of `fading`; None: nodes that hardly anything faces drop out.  whole
+    (nc,): undeformed, those that stresses of the law were made forces with; None: they stay.
     """
 
     slaves: Index
@@ -98,6 +100,7 @@ class MortarPair:
     offset: Array | float = 0.0
     axes: sparse.csr_array | None = None
     areas: Array | None = None
+    whole: Array | None = None
 
     @cached_property
     def both(self) -> Skin:
@@ -193,6 +196,21 @@ class MortarMeeting:
     def met(self) -> Mask:
         """Slaves that meet the master, (nc,)."""
         return self.weights > 0
+
+    @cached_property
+    def growth(self) -> Array:
+        """(1) of `grown_areas`, (nc,); 1 where nobody meets."""
+        if self.pair.whole is None:
+            return np.ones(len(self.slaves))
+        return np.where(self.met, np.maximum(self.weights / self.pair.whole, LEAST), 1.0)
+
+    @property
+    def growth_slopes(self) -> sparse.csr_array:
+        """Of these, (nc, nodes d)."""
+        if self.pair.whole is None:
+            return sparse.csr_array((len(self.slaves), self.x.size))
+        return sparse.csr_array(sparse.diags_array(self.met / self.pair.whole)
+                                @ self.slopes.weights.matrix)  # fmt: skip
 
     @cached_property
     def by_weight(self) -> Array:

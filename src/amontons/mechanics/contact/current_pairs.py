@@ -15,7 +15,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
-from typing import Any, Protocol
+from typing import TYPE_CHECKING, Any, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
@@ -26,7 +26,11 @@ from .carried import TiedMeeting, TiedPair
 from .current_mortar import MortarMeeting, MortarPair
 from .fading import Fading, Mixture
 from .geometry import Obstacle, frames
+from .grown_areas import GrownAreas
 from .surface_axes import carried_frames
+
+if TYPE_CHECKING:
+    from .current import CurrentContact
 
 Array = NDArray[np.float64]
 Index = NDArray[np.int64]
@@ -50,17 +54,41 @@ class Pair(Protocol):
 class Meeting:
     """A pair with an obstacle `side` at some positions.
 
-    slaves (nc,): nodes; x (nc, d): where the slaves are; nodes: of the model; offset (nc,): of
-    the gaps; axes, along: of `Meetings`, None for none.
+    slaves (nc,): nodes; positions (nodes, d): of all nodes; offset (nc,): of the gaps; axes,
+    along: of `Meetings`, None for none; areas: around the slaves, None where they stay.
     """
 
     side: Obstacle
     slaves: Index
-    x: Array
-    nodes: int
+    positions: Array
     offset: Array | float = 0.0
     axes: sparse.csr_array | None = None
     along: Array | None = None
+    areas: GrownAreas | None = None
+
+    @cached_property
+    def x(self) -> Array:
+        """Where the slaves are, (nc, d)."""
+        return self.positions[self.slaves]
+
+    @property
+    def nodes(self) -> int:
+        """Of the model."""
+        return len(self.positions)
+
+    @cached_property
+    def growth(self) -> Array:
+        """(1) of `grown_areas`, (nc,)."""
+        if self.areas is None:
+            return np.ones(len(self.slaves))
+        return self.areas.at(self.positions)
+
+    @property
+    def growth_slopes(self) -> sparse.csr_array:
+        """Of these, (nc, nodes d)."""
+        if self.areas is None:
+            return sparse.csr_array((len(self.slaves), self.positions.size))
+        return self.areas.slopes(self.positions)
 
     @property
     def met(self) -> Mask:
@@ -105,18 +133,20 @@ class ObstaclePair:
     """Slave nodes (nc,) of the model in front of an obstacle; offset (nc,): of their gaps.
 
     axes (2 nc, nodes): c of `surface_axes`, of tangents that the slave carries; None for none.
+    areas: around the slaves, None where they stay.
     """
 
     obstacle: Obstacle
     slaves: Index
     offset: Array | float = 0.0
     axes: sparse.csr_array | None = None
+    areas: GrownAreas | None = None
 
     def at(self, positions: Array) -> Meeting:
         """The slaves and where they are."""
         along = None if self.axes is None else (self.axes @ positions).reshape(-1, 2, 3)
-        return Meeting(self.obstacle, self.slaves, positions[self.slaves], len(positions),
-                       self.offset, self.axes, along)  # fmt: skip
+        return Meeting(self.obstacle, self.slaves, positions, self.offset, self.axes, along,
+                       self.areas)  # fmt: skip
 
 
 @dataclass(frozen=True, eq=False)
@@ -177,6 +207,11 @@ class Meetings:
         return np.concatenate([part.met for part in self.parts])
 
     @cached_property
+    def growth(self) -> Array:
+        """Areas that stresses act on over the undeformed ones, (nc,), of `grown_areas`."""
+        return np.concatenate([part.growth for part in self.parts])
+
+    @cached_property
     def passed(self) -> Array:
         """All forces on the slave's side over lambda, (nc,)."""
         return np.concatenate([part.passed for part in self.parts])
@@ -207,12 +242,9 @@ class Meetings:
         return [part.fading if isinstance(part, MortarMeeting) else None for part in self.parts]
 
     def mixture(
-        self, force: Array, motion: Array, numbers: tuple[Array, Array, Array], free: Mask
+        self, contact: CurrentContact, force: Array, motion: Array, drawn: Array | None
     ) -> Mixture | None:
-        """Of `fading` at forces and motions (nc, d); None where nothing fades.
-
-        numbers: rho, C and o, (nc,) each; free (nc, d).
-        """
+        """Of `fading` at forces and motions (nc, d), q drawn (nc, d-1); None: nothing fades."""
         parts = self._fading
         if not any(parts):
             return None
@@ -223,7 +255,10 @@ class Meetings:
             if fading is not None:
                 weights[mine] = fading.weights
                 passed[mine] = fading.shares @ force[mine]
-        return Mixture(weights, passed, *numbers, free, force, motion, self.gap, self.normals)
+        if drawn is not None:
+            drawn = np.einsum("pk,pkc->pc", drawn, self.frames[:, 1:]) * contact.free
+        return Mixture(weights, passed, contact.rho, contact.give, contact.law.offset,
+                       contact.free, force, motion, self.gap, self.normals, drawn)  # fmt: skip
 
     @cached_property
     def shares(self) -> sparse.csr_array:

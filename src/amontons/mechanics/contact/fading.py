@@ -19,11 +19,13 @@ u of gap and motion, its own compliance and offset among them: for w = 1 the law
 w = 0 the mean force as far as it is within the cone.  A uniform pressure is no error of either.
 That is the law of g' and s' in the place of g and s, H = (lambda - D p) / rho,
 
-    g' = w g + (1 - w) (n . H - C n . lambda - o),    s' = w s + (1 - w) H,                 (3)
+    g' = w g + (1 - w) (n . H - C n . lambda - o),
+    s' = w s + (1 - w) (H - C_T D p_T),    q' = w q,                                        (3)
 
-which `local` of `current` tells, so that statuses and errors are those of the law.  What slid
-while open, `closing`, is taken off z_T as (2) has it: for w = 0 off the mean force.  A bound
-that is a given number would stay whole however little faces a node: Tresca's law does not fade.
+C_T and q of springs along the surface (`framed_point`), else zero, which `local` of `current`
+tells, so that statuses and errors are those of the law.  What slid while open, `closing`, is
+taken off z_T as (2) has it: for w = 0 off the mean force.  A bound that is a given stress says
+itself how much a node bears of what faces it: Tresca's law does not fade.
 
 Where the master ends with a facet kappa_s is 1/2, at a corner of quadrilaterals 5/12, and 1/3
 where the facet beyond is twice as long, or at a corner with one of six triangles: such nodes
@@ -204,19 +206,21 @@ def _rows_of_each(rows: NDArray[np.int64], m: int) -> NDArray[np.int64]:
 class Mixture:
     """(3) of all contacts at forces lambda and motions s (nc, d), gaps (nc,), normals (nc, d).
 
-    weights w (nc,); passed D p (nc, d); rho (nc,); give C, offset o (nc,); free (nc, d).
+    weights w (nc,); passed D p (nc, d); rho (nc,); give C and C_T (nc, 2); offset o (nc,);
+    free (nc, d); drawn q (nc, d), without what supports hold, None for zero.
     """
 
     weights: Array
     passed: Array
     rho: Array
     give: Array
-    offset: Array
+    offset: Array | float
     free: Mask
     force: Array
     own_motion: Array
     own_gap: Array
     normals: Array
+    drawn: Array | None = None
 
     @cached_property
     def _apart(self) -> Array:
@@ -227,7 +231,14 @@ class Mixture:
     def _gap_of_share(self) -> Array:
         """What takes the place of the gap, (nc,)."""
         along = (self.normals * self._apart).sum(axis=1)
-        return along - self.give * (self.normals * self.force).sum(axis=1) - self.offset
+        return along - self.give[:, 0] * (self.normals * self.force).sum(axis=1) - self.offset
+
+    @cached_property
+    def _motion_of_share(self) -> Array:
+        """What takes the place of the motion, (nc, d)."""
+        n, passed = self.normals, self.passed
+        along = passed - n * (n * passed).sum(axis=1)[:, None]
+        return self._apart - self.give[:, 1, None] * along * self.free
 
     @property
     def gap(self) -> Array:
@@ -239,7 +250,8 @@ class Mixture:
     def motion(self) -> Array:
         """s', (nc, d)."""
         w = self.weights[:, None]
-        return np.where(w < 1, w * self.own_motion + (1 - w) * self._apart, self.own_motion)
+        mixed = w * self.own_motion + (1 - w) * self._motion_of_share
+        return np.where(w < 1, mixed, self.own_motion)
 
     def chained(self, partials: Partials) -> tuple[Partials, Array, Array]:
         """Partials by lambda, n, g, s and E of those by g' and s', and two more.
@@ -250,14 +262,20 @@ class Mixture:
         w, n, free = self.weights, self.normals, self.free[:, None, :]
         less = ((1 - w) / self.rho)[:, None, None]
         by_apart = less * (by_gap[:, :, None] * n[:, None, :] + by_motion) * free
-        softer = ((1 - w) * self.give)[:, None, None]
+        softer, slipped = ((1 - w)[:, None] * self.give).T[:, :, None, None]
         by_force = by_force + by_apart
         by_force = by_force - softer * by_gap[:, :, None] * n[:, None, :] * free
-        turned = (1 - w)[:, None] * (self._apart - self.give[:, None] * self.force)
+        turned = (1 - w)[:, None] * self._apart - softer[:, :, 0] * self.force
         by_normal = by_normal + by_gap[:, :, None] * turned[:, None, :]
+        by_slip, across = slipped * by_motion * free, n[:, :, None] * n[:, None, :]
+        along = (n * self.passed).sum(axis=1)[:, None, None] * np.eye(n.shape[1])
+        by_normal = by_normal + by_slip @ (along + n[:, :, None] * self.passed[:, None, :])
+        by_share = -by_apart - by_slip @ (np.eye(n.shape[1]) - across)
         faint = w < 1
         change = np.where(faint, self.own_gap - self._gap_of_share, 0.0)
-        moved = np.where(faint[:, None], self.own_motion - self._apart, 0.0)
+        moved = self.own_motion - self._motion_of_share
+        moved = moved if self.drawn is None else moved + self.drawn
+        moved = np.where(faint[:, None], moved, 0.0)
         by_weight = by_gap * change[:, None] + np.einsum("pij,pj->pi", by_motion, moved)
         out = (by_force, by_normal, by_gap * w[:, None], by_motion * w[:, None, None], by_axis)
-        return out, -by_apart, by_weight
+        return out, by_share, by_weight

@@ -69,10 +69,11 @@ class FramedPoint(ContactPoint):
 
     @cached_property
     def _pulled(self) -> Array | None:
-        """q in global axes, (nc, d), of all components."""
+        """q, or q' of `fading`, in global axes, (nc, d), of all components."""
         if self.drawn is None:
             return None
-        return np.einsum("pk,pkc->pc", self.drawn, self._in_plane)
+        out = np.einsum("pk,pkc->pc", self.drawn, self._in_plane)
+        return out if self.mixed is None else self.mixed.weights[:, None] * out
 
     @cached_property
     def _slip(self) -> Array:

@@ -114,9 +114,9 @@ class LargeDeformation(NonlinearProblem):
         contact = replace(self.parts.contact, law=law)
         return replace(self, parts=replace(self.parts, contact=contact))
 
-    def _law_at(self, meeting: Meetings) -> Law:
-        """The law without what holds contacts that meet nobody any more."""
-        return self.law if meeting.met.all() else self.law.lost(~meeting.met)
+    def growth(self, v: Array | None) -> Array | float:
+        """Areas that stresses of the law act on at a state, over the undeformed ones."""
+        return 1.0 if v is None else self.parts.growth(self.displacement(v))
 
     # ---------------------------------------------------------------- states
     def displacement(self, v: Array) -> Array:
@@ -197,7 +197,7 @@ class LargeDeformation(NonlinearProblem):
         parts, u = self.parts, self.displacement(v)
         needed, blocks = self._needed_slopes(u, pressures)
         point, rest = self._point(u, pieces, None if pressures is None else needed)
-        if not point.meeting.only_obstacles:
+        if self.law.has_stresses or not point.meeting.only_obstacles:
             return PairLinearisation(parts, u, rest, blocks, point, self.earlier, pieces)
         return Linearisation(parts, u, rest, blocks, point, *point.derivatives(pieces))
 
@@ -253,7 +253,7 @@ class LargeDeformation(NonlinearProblem):
         balance = float(np.linalg.norm(rest[self.parts.free]))
         if not self.contacts:
             return balance / load
-        law = self._law_at(self.parts.meet(self.displacement(v)))
+        law = self.parts.contact.law_at(self.parts.meet(self.displacement(v)))
         return max(balance / load, judge.scaled_residual(r, u, law, self.rho) / length)
 
     def _sizes(self, v: Array, r: Array, u: Array, rest: Array) -> tuple[float, float]:
@@ -273,10 +273,10 @@ class LargeDeformation(NonlinearProblem):
             u = self._local(v)[1]
         except InvertedCells:
             return Weakest(np.inf, None)
-        own = np.linalg.norm(u, axis=1)
-        own += np.linalg.norm(r, axis=1) * self.parts.contact.softness
-        own += self.parts.resolved(moved := self.displacement(v))[1]
-        return judge.weakest_of(r, u, self._law_at(self.parts.meet(moved)), self.rho, own)
+        moved, contact = self.displacement(v), self.parts.contact
+        own = np.linalg.norm(u, axis=1) + np.linalg.norm(r, axis=1) * contact.softness
+        own += self.parts.resolved(moved)[1]
+        return judge.weakest_of(r, u, contact.law_at(self.parts.meet(moved)), self.rho, own)
 
     # ---------------------------------------------------------------- load steps
     @property
@@ -369,7 +369,7 @@ class LargeDeformation(NonlinearProblem):
         load, length = self._sizes(v, r, u, rest)
         w = u - (H.T @ v).reshape(u.shape)
         return FrictionProblem.from_global(
-            M, H, M @ v - needed[parts.free], w, self._law_at(meeting), load_scale=load,
+            M, H, M @ v - needed[parts.free], w, parts.contact.law_at(meeting), load_scale=load,
             u_scale=length, name=self.name,
         )  # fmt: skip
 

@@ -16,6 +16,7 @@ from ..contact.current_pairs import ObstaclePair, Pair, between_bodies
 from ..contact.facing import Skin
 from ..contact.free_normals import FreeNormals
 from ..contact.geometry import Plane
+from ..contact.grown_areas import GrownAreas
 from ..contact.overlap import is_itself
 from .supports import locate
 
@@ -41,7 +42,10 @@ def met_pairs(model: Model, slaves: list[Index], linear: Discretisation) -> list
         if contact.obstacle is not None:
             side = FreeNormals(contact.obstacle, is_free[nodes])
             obstacle = contact.obstacle if side.free.all() else side
-            out.append(ObstaclePair(obstacle, nodes, axes=axes))
+            k, name = locate(model.bodies, contact.slave)
+            skin = Skin.of(model.bodies[k].mesh.surface(name), int(linear.offsets[k]) // d)
+            grown = GrownAreas(nodes, skin, X)
+            out.append(ObstaclePair(obstacle, nodes, axes=axes, areas=grown))
             continue
         skins, meshes = [], []
         for side in (contact.slave, *contact.masters):
@@ -50,17 +54,18 @@ def met_pairs(model: Model, slaves: list[Index], linear: Discretisation) -> list
             skins.append(Skin.of(facets, int(linear.offsets[k]) // d))
             meshes.append((model.bodies[k].mesh, name))
         names = (contact.slave, ", ".join(contact.masters))
-        # a given bound does not fade with the pressure: nodes drop out with it
+        # a given bound follows the area that is faced, whatever the pressure
         fades = not contact.tied and contact.tresca is None
         areas = areas_around(skins[0], nodes, X) if fades else None
+        whole = own.rows.weights
         if len(meshes) == 2 and is_itself(*meshes[0], *meshes[1]):
             pair = folded(nodes, skins[0], is_free[nodes], X, names)
-            out.append(replace(pair, axes=axes, areas=areas))
+            out.append(replace(pair, axes=axes, areas=areas, whole=whole))
             continue
         master = Skin.joined(skins[1:])
         pair = MortarPair(nodes, skins[0], master, is_free[nodes], names, axes=axes)
         if not contact.tied:
-            out.append(replace(pair, areas=areas))
+            out.append(replace(pair, areas=areas, whole=whole))
             continue
         blocks = sparse.bsr_array(linear.stored_stiffness, blocksize=(d, d))
         beside = (np.ones(len(blocks.indices)), blocks.indices, blocks.indptr)

@@ -243,11 +243,23 @@ class PairLinearisation:
             start = mine.stop
             yield part, old, mine
 
+    @property
+    def _by_growth(self) -> Array | None:
+        """(2) of `contact.grown_areas`, (nc, d, 1); None where areas tell nothing."""
+        point, (partials, by_share, _) = self.point, self._chained
+        if not point.contact.law.has_stresses:
+            return None
+        left = point.residual(self.given) - np.einsum("pij,pj->pi", partials[0], point.force)
+        if point.mixed is not None:
+            left -= np.einsum("pij,pj->pi", by_share, point.mixed.passed)
+        return (left / point.meeting.growth[:, None])[:, :, None]
+
     @cached_property
     def _by_place(self) -> sparse.csr_array:
         """Derivative of the law by the place of all nodes, lambda held, (nc d, dofs)."""
         parts, meeting, rows = self.parts, self.point.meeting, []
         (_, by_normal, by_gap, by_motion, by_axis), by_share, by_weight = self._chained
+        by_growth = self._by_growth
         for part, old, mine in self._each:
             slopes = by_normal[mine], by_gap[mine], by_motion[mine]
             if isinstance(part, MortarMeeting) and isinstance(old, MortarMeeting):
@@ -260,6 +272,9 @@ class PairLinearisation:
                 rows.append(_law_of_tie(part, old, *slopes))
             else:
                 rows.append(_law_at_obstacle(part, *slopes))
+            if by_growth is not None and not isinstance(part, TiedMeeting):
+                grown = blocks_of(by_growth[mine]) @ part.growth_slopes
+                rows[-1] = sparse.csr_array(rows[-1] + grown)
         local = rows[0] if len(rows) == 1 else sparse.csr_array(sparse.vstack(rows))
         if by_axis is not None and meeting.axes is not None:
             turned = sparse.kron(meeting.axes, sparse.eye_array(len(parts.points[0])), "csr")

@@ -140,6 +140,10 @@ class NonlinearParts:
         """States, and these parts with the sides of folds there."""
         return deque(maxlen=KEPT)
 
+    def growth(self, u: Array) -> Array | float:
+        """Of `contact.grown_areas` at displacements u (nodes, d), (nc,); 1 for all of them."""
+        return self.meet(u).growth if self.contact.law.has_stresses else 1.0
+
     def without_fading(self) -> NonlinearParts:
         """The same with nodes that drop out where hardly anything faces them."""
         pairs = tuple(replace(pair, areas=None) if isinstance(pair, MortarPair) else pair

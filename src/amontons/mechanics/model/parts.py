@@ -156,8 +156,9 @@ class Contact:
     With mu also cap, the largest shear traction whatever the pressure; with both cohesion, the
     largest tensile traction, which acts where the sides touch in the undeformed state and is
     not lost when they part (`problem.law.cohesive`).  Stresses become forces, the area of the
-    node times the value at the node; with mortar times the mean of the function with the dual
-    function of the node, if that is > 0.  law: the same numbers as a value, CappedCoulomb(mu,
+    node (of now where contacts are found there, see `contact.grown_areas`) times the value;
+    with mortar times the mean of the function with the dual function of the node, if that is
+    > 0.  law: the same numbers as a value, CappedCoulomb(mu,
     cap), Cohesive(Coulomb(mu), cohesion), …, each one number or one per slave node.
     stiffness, stick_stiffness: contact that gives way (`problem.law.compliant`), pressure over
     overclosure and shear traction over elastic slip, stress / length, > 0; by default rigid.

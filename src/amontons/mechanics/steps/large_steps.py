@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...core.clock import NEVER, Deadline
-from ...problem.law import VaryingFriction
+from ...problem.law import Law, VaryingFriction
 from ...problem.law.law import MU
 from ...problem.solution import FrictionSolution
 from ..contact.closing import slid_while_open
@@ -66,7 +66,7 @@ class LargeSlowModel:
         q0 = state.displacement
         body = self.motion.body
         body = body.divided(q0) if nonlinear_parts(body).folds else body
-        drawn = self._drawn(state)
+        drawn = self._drawn(body, state)
         problem = large_step(body, load, prescribed, q0, self._known(state), drawn)
         if self.crossing is None:  # a kink beyond those that paths know
             problem = replace(problem, play=slid_open(problem, state, time - state.time))
@@ -86,10 +86,11 @@ class LargeSlowModel:
         if drawn is not None:
             drawn = still_drawn(drawn, axes, problem.parts.contact.free)
         tied = body.law.tied[:, None]  # what bonds give way is no slip
-        way = solution.u[:, 1:] if drawn is None else solution.u[:, 1:] - drawn
-        slid = way if drawn is None else Springs.of(body.law, axes.shape[1]).slipped(
-            np.column_stack([way[:, 0], way]), state.force, solution.r
-        )
+        way = slid = solution.u[:, 1:]
+        if drawn is not None:
+            way = solution.u[:, 1:] - drawn
+            slid = way + self._stretched(body, q1, solution.r)
+            slid -= self._stretched(body, q0, state.force)
         way, slid = np.where(tied, 0.0, way), np.where(tied, 0.0, slid)
         work = quasi_static_friction(state.force[:, 1:], solution.r[:, 1:], slid)
         acting = self._forces(body, q1, load, solution.r)
@@ -106,13 +107,22 @@ class LargeSlowModel:
                         support_forces(self.motion.parts, rest), acting.load, axes,
                         passage, passed=meeting.passed)  # fmt: skip
 
-    def _drawn(self, state: State) -> Array | None:
+    def _drawn(self, body: Model, state: State) -> Array | None:
         """How far springs along the surface are drawn, (nc, d-1); None without any."""
-        law = self.motion.body.law
-        springs = Springs.of(law, state.force.shape[1])
-        if not (springs.sticks & ~law.tied).any():
+        if not (Springs.of(body.law, state.force.shape[1]).sticks & ~body.law.tied).any():
             return None
-        return np.where(law.tied[:, None], 0.0, -springs.C[:, 1:] * state.force[:, 1:])
+        drawn = self._stretched(body, state.displacement, state.force)
+        return np.where(body.law.tied[:, None], 0.0, -drawn)
+
+    def _stretched(self, body: Model, q: Array, force: Array) -> Array:
+        """C_T r_T at displacements q (dofs,), (nc, d-1); force (nc, d) in the frames there."""
+        law = self._law_at(body, q)
+        return Springs.of(law, force.shape[1]).C[:, 1:] * force[:, 1:]
+
+    def _law_at(self, body: Model, q: Array) -> Law:
+        """The law on the areas at displacements q (dofs,)."""
+        parts = nonlinear_parts(body)
+        return parts.contact.over(parts.meet(q.reshape(parts.X.shape))).law
 
     def explained(self, solution: FrictionSolution) -> FrictionSolution:
         """The same record; one that failed says which bodies give way."""
@@ -153,7 +163,7 @@ class LargeSlowModel:
         moved = q.reshape(parts.X.shape)
         meeting = parts.meet(moved)
         pushed = meeting.pushed(meeting.frames, r)
-        stored = Springs.of(self.motion.body.law, r.shape[1]).energy(r)
+        stored = Springs.of(parts.contact.over(meeting).law, r.shape[1]).energy(r)
         return Forces(parts.forces(moved), load.at(moved), pushed, parts.energy(moved), stored)
 
 
@@ -164,7 +174,8 @@ def slid_open(problem: LargeDeformation, state: State, duration: float) -> Array
     the slip take that of all of a step, those along tangents of the surface have no such law.
     """
     parts = problem.parts
-    contact, moved = parts.contact, (duration * state.velocity).reshape(parts.X.shape)
+    contact = parts.contact.over(problem.earlier)
+    moved = (duration * state.velocity).reshape(parts.X.shape)
     law = contact.law
     if contact.framed or law.varies or not moved.any():
         return None
@@ -193,7 +204,7 @@ def last_motion(problem: LargeDeformation, state: State, duration: float) -> Arr
     n = meeting.normals
     along = meeting.relative(moved.reshape(parts.X.shape))
     along -= n * (n * along).sum(axis=1)[:, None]
-    law = parts.contact.law
+    law = parts.contact.over(meeting).law
     pressed = np.array(law.pressed(state.force))  # T^-1 r; T^-1 of that is where it slips from
     size, bound = np.linalg.norm(pressed[:, 1:], axis=1), law.parameters[:, MU]
     bound = bound * np.maximum(pressed[:, 0], 0.0)

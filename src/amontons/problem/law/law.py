@@ -86,6 +86,14 @@ class Law(KeepsLocks):
         """Contacts that neither part nor slip, (nc,)."""
         return self.kind == TIED
 
+    @cached_property
+    def has_stresses(self) -> bool:
+        """True where its forces, or lengths over forces, belong to the area of a contact."""
+        of_area = np.isfinite(self.plain.parameters[:, BOUND]) | (self.cohesion > 0)
+        if self.give is not None:
+            of_area |= (self.give > 0).any(axis=1)
+        return self.varies or bool((of_area & ~self.tied).any())
+
     def bound(self, r: Array) -> Array:
         """Largest |r_T| allowed at r, shape (nc,)."""
         mu, bound = self.parameters.T

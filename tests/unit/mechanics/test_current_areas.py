@@ -1,0 +1,100 @@
+"""Stresses of contact laws act on the area of now that faces the other side.
+
+CalculiX 2.20, surface to surface with NLGEOM, gives the same resultants for these slabs and
+blocks as hexahedra: overclosure times stiffness times the area, to all its digits.
+"""
+
+import numpy as np
+import pytest
+from tangent_checker import checked_tangents
+
+import amontons as am
+from amontons.mechanics.model.large_deformation import large_deformation, large_step
+
+RIGID, SOFT = am.NeoHookean(1e5, 0.0), am.NeoHookean(1.0, 0.3)  # beside springs of contacts
+DEEP, SLID = 1e-3, 4e-4
+K, SLOPE = 2.0, 3.0
+CURVE = am.OverclosureCurve([0.0, K * DEEP / 2, K * DEEP], [0.0, DEEP / 4, DEEP])
+SPRINGS = {"mu": 0.9, "stiffness": K, "stick_stiffness": SLOPE}
+
+
+def wider(x, t):
+    """Twice as long until 1."""
+    return x[0] * min(t, 1.0)
+
+
+def down(x, t):
+    """From .1 above, after 1."""
+    return -(0.1 + DEEP) * min(max(t - 1.0, 0.0), 1.0)
+
+
+def along(x, t):
+    """After 2."""
+    return SLID * max(t - 2.0, 0.0)
+
+
+def pressed(dim, first, last, **law):
+    """Forces on a slab of length 2 made twice as long, under a block from first to last."""
+    wide = (1.0,) * (dim - 2)
+    slab = am.box((2, *wide, 1), (4, *(1,) * (dim - 1)), origin=(0,) * (dim - 1) + (-1,))
+    above = (first, *(-0.5,) * (dim - 2), 0.1)
+    block = am.box((last - first, *(2.0,) * (dim - 2), 1), (1,) * dim, origin=above)
+    free = (None,) * (dim - 2)
+    supports = [am.Fix("lower.bottom", (None, *free, 0)),
+                am.Fix("upper.top", (along, *(0,) * (dim - 2), down))]  # fmt: skip
+    supports += [am.Fix(f"lower.{side}", (wider, *free, None)) for side in ("left", "right")]
+    supports += [am.Fix("lower.front", (None, 0, None))] if dim == 3 else []
+    contact = am.Contact("lower.top", master="upper.bottom", **law)
+    bodies = [am.Body(slab, RIGID, name="lower"), am.Body(block, RIGID, name="upper")]
+    model = am.Model(bodies, supports, [contact])
+    *_, step = am.evolve(model, am.QuasiStatic(1.0), until=3.0)
+    assert step.solution.converged
+    return step.fields.resultant
+
+
+@pytest.mark.parametrize(("dim", "first", "last", "area", "held"), [
+    (2, -0.5, 4.5, 4.0, 1.0), (2, 3.0, 5.2, 1.0 - SLID, 0.5), (3, 1.1, 2.3, 1.2, 0.0)
+])  # fmt: skip
+def test_springs_are_those_of_the_area_that_is_faced(dim, first, last, area, held):
+    """All of the slab, an end of it, and a part in the middle of facets, where a node fades.
+
+    held: what is around nodes whose shear supports take.
+    """
+    force = pressed(dim, first, last, **SPRINGS)
+    np.testing.assert_allclose(force[-1], -K * DEEP * area, rtol=2e-4)
+    np.testing.assert_allclose(force[0], SLOPE * SLID * (area - held), rtol=2e-3)
+
+
+def test_curves_are_those_of_the_area_that_is_faced():
+    force = pressed(2, 3.0, 5.2, mu=0.0, stiffness=CURVE)
+    np.testing.assert_allclose(force[-1], -K * DEEP * (1 - SLID), rtol=1e-4)
+
+
+def floor(dim, order, **law):
+    """A soft body on an obstacle."""
+    mesh = am.box((1.0,) * dim, (2,) * dim)
+    tilted = am.Plane((0.1,) * (dim - 1) + (1,), (0.0,) * dim)
+    contact = am.Contact("bottom", tilted, **law)
+    body = am.Body(mesh, SOFT, order=order)
+    return am.Model([body], [am.Fix("top", 0)], [contact])
+
+
+def test_a_stretched_body_stands_on_springs_of_its_area():
+    """Twice as long on a plane that it overlaps."""
+    slab = am.Body(am.box((2, 1), (4, 1)), RIGID)
+    sides = [am.Fix(side, (lambda x: x[0], None)) for side in ("left", "right")]
+    contact = am.Contact("bottom", am.Plane((0, 1), (0, DEEP)), mu=0.0, stiffness=K)
+    found = am.solve(am.Model([slab], [*sides, am.Fix("top", (None, 0))], [contact]))
+    assert found.resultant.ravel()[1] == pytest.approx(4 * K * DEEP, rel=2e-4)
+
+
+@pytest.mark.parametrize(("dim", "order", "law"), [
+    (2, 1, SPRINGS), (2, 2, {"tresca": 0.01}), (3, 1, SPRINGS),
+    (3, 2, {"mu": 0.3, "cap": 0.02, "cohesion": 0.01, "stiffness": 3.0})])  # fmt: skip
+def test_tangents_in_front_of_obstacles_are_exact(dim, order, law):
+    model, rng = floor(dim, order, **law), np.random.default_rng(7)
+    dofs = large_deformation(model).parts.X.size
+    before = 0.01 * rng.standard_normal(dofs)
+    problem = large_step(model, np.zeros(dofs), np.zeros(dofs), before)
+    draws = (rng.standard_normal((2, problem.unknowns)) * [[0.02], [1.0]] for _ in range(8))
+    assert checked_tangents(problem, draws) > 2
