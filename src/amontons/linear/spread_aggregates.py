@@ -85,13 +85,14 @@ def transfer_to_aggregates(
 
     comm, given = rows.comm, modes.shape[1]
     width = given + -given % 3  # of aggregates too nodes have three unknowns
-    joined, _ = standard_aggregation(_couplings_inside(rows, together))
+    unit, count = np.full(rows.own // together, -1), 0
+    if len(unit):
+        joined, _ = standard_aggregation(_couplings_inside(rows, together))
+        unit[np.diff(joined.indptr) > 0] = joined.indices
+        count = int(joined.shape[1]) if joined.nnz else 0
+    unit = np.repeat(unit, together)
     padded = np.zeros((rows.own, 3, width))
     padded[:, : rows.d, :given] = modes.reshape(rows.own, rows.d, given)
-    unit = np.full(rows.own // together, -1)
-    unit[np.diff(joined.indptr) > 0] = joined.indices
-    unit = np.repeat(unit, together)
-    count = int(joined.shape[1]) if joined.nnz else 0
     starts = starts_of(comm, count)
     if not starts[-1]:
         return None
@@ -112,7 +113,7 @@ def transfer_to_aggregates(
 
 
 def _couplings_inside(rows: SpreadRows, together: int) -> sparse.csr_array:
-    """The graph of own nodes, so many together, without weak couplings or zeros of held ones."""
+    """The graph of own nodes, so many together, without weak couplings and zeros."""
     t, count = rows.tiles, rows.own // together
     squares = np.einsum("kij,kij->k", t.data, t.data)
     row = np.repeat(np.arange(rows.own, dtype=np.int32), np.diff(t.indptr)) // together
@@ -177,7 +178,7 @@ def _smoothed(rows: SpreadRows, T: Array, whose: Index, omega: float) -> Rows:
     """Own rows of (I - omega D^-1 A) T, T with a block (3, w) of unit `whose` a node, or -1."""
     t = rows.tiles
     known, unit = np.unique(whose, return_inverse=True)
-    unit = unit.astype(np.int64) - (known[0] < 0)
+    unit = unit.astype(np.int64) - np.count_nonzero(known < 0)
     pointers = units_of_rows(t.indptr, t.indices, unit, len(known))
     units = np.empty(pointers[-1], dtype=np.int32)
     blocks = np.zeros((pointers[-1], 3, T.shape[2]))

@@ -1,8 +1,9 @@
-"""Multigrid for a spread matrix: one level of our own above PETSc's.
+"""Multigrid for a spread matrix: levels of our own above PETSc's.
 
-The finest level is swept by Gauss-Seidel on the rows of each process, and coarsened by
-aggregates (`spread_aggregates`), which takes little memory; below it PETSc has a matrix A_1 of
-some twentieth of the unknowns, and GAMG for it.
+A level of ours is swept by Gauss-Seidel on the rows of each process, and coarsened by
+aggregates of one process each (`spread_aggregates`), which takes little memory.  An aggregate
+is one or two nodes of the level below, which is of the same kind while processes have enough of
+it; at last PETSc has a matrix of few unknowns, and factors or GAMG for it.
 
 From one step of Newton's method to the next A changes near contacts alone, by dA, and so do
 the coarse matrices,
@@ -81,7 +82,6 @@ class SpreadCycle:
 
     def add(self, rows: sparse.bsr_array) -> None:
         """Add own rows, which are empty but at `changing`, and what they are to those below."""
-        t = self.rows.tiles
         blocks, columns, pointers = in_threes(rows)
         if self._places is None:
             self._places = self._found(columns, pointers)
@@ -116,7 +116,8 @@ class SpreadCycle:
 
     def destroy(self) -> None:
         """Give the memory back; all processes have to."""
-        for part in (self.P, self.below, self.rows if self._places is not None else None):
+        rows_below = self.below.rows if isinstance(self.below, SpreadCycle) else None
+        for part in (self.P, self.below, rows_below):
             if part is not None:
                 part.destroy()
 
@@ -140,7 +141,7 @@ def level_below(P: SpreadTransfer, change: CoarseProduct) -> SpreadCycle | Coars
 
 
 def in_threes(rows: sparse.bsr_array) -> tuple[Array, Index, Index]:
-    """Blocks (k, 3, 3), columns and pointers of rows in blocks (w, w), w three times a number."""
+    """Blocks (k, 3, 3), columns and pointers of rows in blocks (w, w), w / 3 whole."""
     m, counts = rows.data.shape[1] // 3, np.diff(rows.indptr)
     if m == 1:
         return rows.data, rows.indices, rows.indptr
