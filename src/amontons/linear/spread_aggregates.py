@@ -85,7 +85,7 @@ def transfer_to_aggregates(
 
     comm, given = rows.comm, modes.shape[1]
     width = given + -given % 3  # of aggregates too nodes have three unknowns
-    unit, count = np.full(rows.own // together, -1), 0
+    unit, count, joined = np.full(rows.own // together, -1), 0, None
     if len(unit):
         joined, _ = standard_aggregation(_couplings_inside(rows, together))
         unit[np.diff(joined.indptr) > 0] = joined.indices
@@ -97,7 +97,7 @@ def transfer_to_aggregates(
     if not starts[-1]:
         return None
     T, coarse = np.zeros((rows.own, 3, width)), np.zeros((0, width))
-    if count:
+    if joined is not None and count:
         pieces, coarse = fit_candidates(joined, padded.reshape(-1, width))
         T[unit >= 0] = sparse.bsr_array(pieces).data.reshape(-1, 3, width)
     whose = np.full(rows.local, -1.0)

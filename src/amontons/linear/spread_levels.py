@@ -148,7 +148,7 @@ def in_threes(rows: sparse.bsr_array) -> tuple[Array, Index, Index]:
     pointers = np.concatenate([[0], np.cumsum(np.repeat(m * counts, m))])
     ends = m * m * np.asarray(rows.indptr)
     blocks = np.empty((ends[-1], 3, 3))
-    columns = np.empty(ends[-1], dtype=rows.indices.dtype)
+    columns: Index = np.empty_like(rows.indices, shape=(ends[-1],))
     row = np.repeat(np.arange(len(counts)), counts)
     at = ends[row] + m * (np.arange(len(row)) - rows.indptr[row])
     for i in range(m):
