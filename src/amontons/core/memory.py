@@ -7,18 +7,11 @@ a whole mesh has needed on the process that cut it, blocks of a matrix that PETS
 from __future__ import annotations
 
 import ctypes
-import gc
 import sys
 
 
-def give_back() -> None:
-    """Let the C library return the pages that nothing lives on; nothing where it can not."""
-    gc.collect()
-    trim()
-
-
 def trim() -> None:
-    """The same of what is free already."""
+    """Let the C library return the pages that nothing lives on; nothing where it can not."""
     if sys.platform == "linux":
         release = getattr(ctypes.CDLL(None), "malloc_trim", None)  # glibc alone has it
         if release is not None:

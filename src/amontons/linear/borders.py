@@ -6,6 +6,8 @@ PETSc's scatters, once a product; rows of matrices by one exchange of all with a
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+from contextlib import contextmanager
 from dataclasses import dataclass
 from typing import Any
 
@@ -40,23 +42,29 @@ class Borders:
         """Put those of ghosts behind own ones, in values (own + g, ...)."""
         if self.alone:
             return
-        flat = values.reshape(-1)
-        self._mine.array = flat[: self.own]
-        self._scatter.scatter(self._mine, self._theirs, mode=petsc().ScatterMode.FORWARD)
-        flat[self.own :] = self._theirs.array_r
+        with self._placed(values):
+            self._scatter.scatter(self._mine, self._theirs, mode=petsc().ScatterMode.FORWARD)
 
     def give(self, values: Array) -> None:
         """Add those at ghosts, of values (own + g, ...), to those of the process that owns."""
         if self.alone:
             return
-        PETSc, flat = petsc(), values.reshape(-1)
-        self._mine.array = flat[: self.own]
-        self._theirs.array = flat[self.own :]
-        self._scatter.scatter(
-            self._theirs, self._mine, addv=PETSc.InsertMode.ADD_VALUES,
-            mode=PETSc.ScatterMode.REVERSE,
-        )  # fmt: skip
-        flat[: self.own] = self._mine.array_r
+        PETSc = petsc()
+        with self._placed(values):
+            self._scatter.scatter(
+                self._theirs, self._mine, addv=PETSc.InsertMode.ADD_VALUES,
+                mode=PETSc.ScatterMode.REVERSE,
+            )  # fmt: skip
+
+    @contextmanager
+    def _placed(self, values: Array) -> Iterator[None]:
+        """Let PETSc's vectors live in values (own + g, ...), without copies."""
+        flat = values.reshape(-1)
+        self._mine.placeArray(flat[: self.own])
+        self._theirs.placeArray(flat[self.own :])
+        yield
+        for part in (self._mine, self._theirs):
+            part.resetArray()
 
     def destroy(self) -> None:
         """Give the memory back; all processes have to."""

@@ -74,24 +74,32 @@ class SpreadTransfer:
         self.borders.destroy()
 
 
-def transfer_to_aggregates(rows: SpreadRows, modes: Array) -> SpreadTransfer | None:
-    """P of a matrix as it is now; modes (own d, w): near-null motions.  None without any."""
+def transfer_to_aggregates(
+    rows: SpreadRows, modes: Array, together: int = 1
+) -> SpreadTransfer | None:
+    """P of a matrix as it is now; modes (own d, w): near-null motions.  None without any.
+
+    together: nodes that follow one another and stay together, as those of an aggregate do.
+    """
     from pyamg.aggregation import fit_candidates, standard_aggregation
 
-    comm, width = rows.comm, modes.shape[1]
-    joined, _ = standard_aggregation(_couplings_inside(rows))
+    comm, given = rows.comm, modes.shape[1]
+    width = given + -given % 3  # of aggregates too nodes have three unknowns
+    unit, count, joined = np.full(rows.own // together, -1), 0, None
+    if len(unit):
+        joined, _ = standard_aggregation(_couplings_inside(rows, together))
+        unit[np.diff(joined.indptr) > 0] = joined.indices
+        count = int(joined.shape[1]) if joined.nnz else 0
+    unit = np.repeat(unit, together)
     padded = np.zeros((rows.own, 3, width))
-    padded[:, : rows.d] = modes.reshape(rows.own, rows.d, width)
-    unit = np.full(rows.own, -1)
-    unit[np.diff(joined.indptr) > 0] = joined.indices
-    count = int(joined.shape[1]) if joined.nnz else 0
+    padded[:, : rows.d, :given] = modes.reshape(rows.own, rows.d, given)
     starts = starts_of(comm, count)
     if not starts[-1]:
         return None
     T, coarse = np.zeros((rows.own, 3, width)), np.zeros((0, width))
-    if count:
+    if joined is not None and count:
         pieces, coarse = fit_candidates(joined, padded.reshape(-1, width))
-        T[unit >= 0] = sparse.bsr_array(pieces).tobsr((3, width)).data
+        T[unit >= 0] = sparse.bsr_array(pieces).data.reshape(-1, 3, width)
     whose = np.full(rows.local, -1.0)
     whose[: rows.own] = np.where(unit >= 0, unit + starts[comm.rank], -1)
     T = np.concatenate([T, np.zeros((len(rows.ghosts), 3, width))])
@@ -104,14 +112,18 @@ def transfer_to_aggregates(rows: SpreadRows, modes: Array) -> SpreadTransfer | N
     return _transfer(rows, mine, starts, np.asarray(coarse))
 
 
-def _couplings_inside(rows: SpreadRows) -> sparse.csr_array:
-    """The graph of own nodes, without couplings that are weak, or zero as of held ones."""
-    t = rows.tiles
+def _couplings_inside(rows: SpreadRows, together: int) -> sparse.csr_array:
+    """The graph of own nodes, so many together, without weak couplings and zeros."""
+    t, count = rows.tiles, rows.own // together
     squares = np.einsum("kij,kij->k", t.data, t.data)
-    row = np.repeat(np.arange(rows.own, dtype=np.int32), np.diff(t.indptr))
-    some = (t.indices < rows.own) & (t.indices != row) & (squares > 0)
-    row, column, squares = row[some], t.indices[some], squares[some]
-    most = np.zeros(rows.own)
+    row = np.repeat(np.arange(rows.own, dtype=np.int32), np.diff(t.indptr)) // together
+    column = t.indices // together
+    some = (column < count) & (column != row) & (squares > 0)
+    row, column, squares = row[some], column[some], squares[some]
+    if together > 1:
+        sums = sparse.coo_array((squares, (row, column)), shape=(count, count)).tocsr().tocoo()
+        (row, column), squares = sums.coords, sums.data
+    most = np.zeros(count)
     np.maximum.at(most, row, squares)
     return strong_graph(row, column, squares, most)
 
@@ -166,7 +178,7 @@ def _smoothed(rows: SpreadRows, T: Array, whose: Index, omega: float) -> Rows:
     """Own rows of (I - omega D^-1 A) T, T with a block (3, w) of unit `whose` a node, or -1."""
     t = rows.tiles
     known, unit = np.unique(whose, return_inverse=True)
-    unit = unit.astype(np.int64) - (known[0] < 0)
+    unit = unit.astype(np.int64) - np.count_nonzero(known < 0)
     pointers = units_of_rows(t.indptr, t.indices, unit, len(known))
     units = np.empty(pointers[-1], dtype=np.int32)
     blocks = np.zeros((pointers[-1], 3, T.shape[2]))

@@ -1,8 +1,9 @@
-"""Multigrid for a spread matrix: one level of our own above PETSc's.
+"""Multigrid for a spread matrix: levels of our own above PETSc's.
 
-The finest level is swept by Gauss-Seidel on the rows of each process, and coarsened by
-aggregates (`spread_aggregates`), which takes little memory; below it PETSc has a matrix A_1 of
-some twentieth of the unknowns, and GAMG for it.
+A level of ours is swept by Gauss-Seidel on the rows of each process, and coarsened by
+aggregates of one process each (`spread_aggregates`), which takes little memory.  An aggregate
+is one or two nodes of the level below, which is of the same kind while processes have enough of
+it; at last PETSc has a matrix of few unknowns, and factors or GAMG for it.
 
 From one step of Newton's method to the next A changes near contacts alone, by dA, and so do
 the coarse matrices,
@@ -40,6 +41,7 @@ Index = NDArray[np.integer]
 DENSE = 64  # processes at most that make rows of a product in a dense one
 SLAB = 200_000  # entries that are handed over at a time, some three times in memory
 DIRECT = 1_000  # unknowns of a coarse matrix that every process factors, at most
+OURS = 100  # unknowns a process, in the mean, of a coarse matrix that PETSc gets, at most
 GAMG = {
     "pc_gamg_reuse_interpolation": True,
     # Directions that supports hold keep zeros.  With these as couplings two processes got a
@@ -51,22 +53,25 @@ GAMG = {
 class SpreadCycle:
     """One V(1,1) cycle for a matrix as it is now, whose rows at `changing` nodes may change.
 
-    modes (own d, w): near-null motions.
+    modes (own d, w): near-null motions; together: as of `transfer_to_aggregates`.
     """
 
-    def __init__(self, rows: SpreadRows, modes: Array, changing: Index) -> None:
-        self.rows, self.P, self.below = rows, transfer_to_aggregates(rows, modes), None
+    def __init__(
+        self, rows: SpreadRows, modes: Array, changing: Index, together: int = 1
+    ) -> None:
+        self.rows, self.P = rows, transfer_to_aggregates(rows, modes, together)
+        self.below: SpreadCycle | CoarseLevels | None = None
         self._x, self._b, self._r = rows.vector(), *np.zeros((2, rows.own, 3))
-        self.blocks, ends = rows.tiles.slots(changing)
+        self.changing, (self.blocks, ends) = changing, rows.tiles.slots(changing)
+        self._places: Index | None = None
         if self.P is None:
             return
         t = rows.tiles
         self.change = CoarseProduct(self.P, changing, ends, t.indices[self.blocks])
         self._data = t.data[self.blocks]
         trim()
-        A = coarse_matrix(self.P)
+        self.below = level_below(self.P, self.change)
         trim()
-        self.below = CoarseLevels(A, self.P.modes)
 
     def follow(self, data: Array) -> None:
         """Let coarse levels be those of a matrix with other blocks (k, 3, 3) at `blocks`."""
@@ -74,6 +79,26 @@ class SpreadCycle:
             change, self._data = data - self._data, data
             if self.rows.comm.allreduce(int(change.any())):
                 self.below.add(self.change.of(change))
+
+    def add(self, rows: sparse.bsr_array) -> None:
+        """Add own rows, which are empty but at `changing`, and what they are to those below."""
+        blocks, columns, pointers = in_threes(rows)
+        if self._places is None:
+            self._places = self._found(columns, pointers)
+        change = np.zeros((len(self.blocks), 3, 3))
+        change[self._places] = blocks
+        self.rows.add(self.blocks, change, self.changing)
+        if self.below is not None:
+            self.below.add(self.change.of(change))
+
+    def _found(self, columns: Index, pointers: Index) -> Index:
+        """Where entries with columns in the numbers of all stand among `blocks`."""
+        t, count = self.rows.tiles, int(self.rows.starts[-1])
+        mine = np.repeat(self.changing, np.diff(t.indptr)[self.changing])
+        keys = mine * count + self.rows.numbers()[t.indices[self.blocks]]
+        order = np.argsort(keys)
+        row = np.repeat(np.arange(len(pointers) - 1), np.diff(pointers))
+        return order[np.searchsorted(keys, row * count + columns, sorter=order)]
 
     def apply(self, b: Array) -> Array:
         """What the cycle makes of own values (own d,), from zero."""
@@ -91,17 +116,47 @@ class SpreadCycle:
 
     def destroy(self) -> None:
         """Give the memory back; all processes have to."""
-        for part in (self.P, self.below):
+        rows_below = self.below.rows if isinstance(self.below, SpreadCycle) else None
+        for part in (self.P, self.below, rows_below):
             if part is not None:
                 part.destroy()
 
 
-def coarse_matrix(P: SpreadTransfer) -> Any:
-    """P' A P as a matrix of PETSc."""
-    t, comm = P.rows.tiles, P.rows.comm
+def level_below(P: SpreadTransfer, change: CoarseProduct) -> SpreadCycle | CoarseLevels:
+    """The level of P' A P, in whose rows `change` has entries later."""
+    t, comm, width = P.rows.tiles, P.rows.comm, P.width
     rows = CoarseProduct(P, np.arange(P.rows.own), t.indptr, t.indices).of(t.data)
     let_lone_rest(comm, rows, int(P.starts[comm.rank]))
-    return spread_matrix(comm, rows, P.width)
+    size = width * int(P.starts[-1])
+    if size <= max(DIRECT, OURS * comm.size):
+        return CoarseLevels(spread_matrix(comm, rows, width), P.modes)
+    blocks, columns, pointers = in_threes(rows)
+    shape = rows.shape
+    del rows
+    below = SpreadRows(comm, sparse.bsr_array((blocks, columns, pointers), shape=shape), 3)
+    units = np.flatnonzero(np.diff(change.pointers[: P.own + 1]))
+    together = width // 3
+    nodes = (together * units[:, None] + np.arange(together)).ravel()
+    return SpreadCycle(below, P.modes, nodes, together)
+
+
+def in_threes(rows: sparse.bsr_array) -> tuple[Array, Index, Index]:
+    """Blocks (k, 3, 3), columns and pointers of rows in blocks (w, w), w / 3 whole."""
+    m, counts = rows.data.shape[1] // 3, np.diff(rows.indptr)
+    if m == 1:
+        return rows.data, rows.indices, rows.indptr
+    pointers = np.concatenate([[0], np.cumsum(np.repeat(m * counts, m))])
+    ends = m * m * np.asarray(rows.indptr)
+    blocks = np.empty((ends[-1], 3, 3))
+    columns: Index = np.empty_like(rows.indices, shape=(ends[-1],))
+    row = np.repeat(np.arange(len(counts)), counts)
+    at = ends[row] + m * (np.arange(len(row)) - rows.indptr[row])
+    for i in range(m):
+        for j in range(m):
+            place = at + i * m * counts[row] + j
+            blocks[place] = rows.data[:, 3 * i : 3 * i + 3, 3 * j : 3 * j + 3]
+            columns[place] = m * rows.indices + j
+    return blocks, columns, pointers
 
 
 class CoarseLevels:

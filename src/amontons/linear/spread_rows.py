@@ -120,6 +120,11 @@ class SpreadRows:
         self.tiles.data.reshape(-1)[places] = values
         self._invert(nodes)
 
+    def add(self, blocks: Index, change: Array, nodes: Index) -> None:
+        """Add to blocks (k,), all in the rows of some nodes, (k, 3, 3)."""
+        self.tiles.data[blocks] += change
+        self._invert(nodes)
+
     def _couplings_with_ghosts(self) -> Array:
         """HALF the sums of |entries| of own rows in columns of ghosts, (own, 3)."""
         t = self.tiles

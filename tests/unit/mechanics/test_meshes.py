@@ -5,7 +5,7 @@ import pytest
 
 import amontons as am
 from amontons.mechanics.meshes.cells import CELLS
-from amontons.mechanics.meshes.check import MIRROR
+from amontons.mechanics.meshes.check import MIRROR, _determinants, tet_determinants
 from amontons.mechanics.meshes.facets import Cells, Facets, boundary, sides
 from amontons.mechanics.meshes.surfaces import (
     facet_areas,
@@ -191,3 +191,14 @@ def test_the_boundary_is_what_one_cell_alone_has(mesh):
         np.sort(table, axis=1), axis=0, return_index=True, return_counts=True
     )
     np.testing.assert_array_equal(found.nodes, table[np.sort(first[count == 1])])
+
+
+def test_many_tetrahedra_are_judged_as_few_ones():
+    mesh = am.box((1, 2, 3), cells=3, kind="tet")
+    points = mesh.points + 0.2 * np.random.default_rng(0).standard_normal(mesh.points.shape)
+    points[:2] = points[2]  # one of no volume
+    table = np.array(mesh.cells[0].nodes)
+    expected, _ = _determinants(CELLS["tet"], points[table])
+    found = tet_determinants(points, table)
+    assert (found < 0).any() and (found == 0).any()
+    np.testing.assert_allclose(found, expected, atol=1e-15)

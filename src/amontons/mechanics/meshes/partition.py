@@ -13,6 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...core.arrays import read_only
+from ...core.compiled import njit
 from ...core.errors import InvalidInput
 from .mesh import Mesh
 
@@ -60,13 +61,8 @@ class Cut:
 
     def __init__(self, mesh: Mesh, owner: Index, parts: int) -> None:
         self.mesh = mesh
-        self.cells: list[tuple[Index, Index]] = []
-        for block in mesh.cells:
-            whose = np.sort(owner[block.nodes], axis=1)
-            new = np.ones(whose.shape, dtype=bool)
-            new[:, 1:] = whose[:, 1:] != whose[:, :-1]
-            order, starts = sorted_by(whose[new], parts)
-            self.cells.append((np.nonzero(new)[0][order], starts))
+        self.cells = [cells_of_parts(block.nodes, owner, parts) for block in mesh.cells]
+        self._number = np.full(len(mesh.points), -1)
 
     def part(self, number: int) -> tuple[Mesh | None, Index]:
         """The cells with a node of a part, as a mesh without surfaces, and its nodes.
@@ -74,11 +70,16 @@ class Cut:
         None where there are none.  Nodes (k,) are numbers in the whole mesh, ascending.
         """
         some = [cells[starts[number] : starts[number + 1]] for cells, starts in self.cells]
-        return part_of(self.mesh, some)
+        return part_of(self.mesh, some, self._number)
 
 
-def part_of(mesh: Mesh, wanted: Sequence[Index]) -> tuple[Mesh | None, Index]:
-    """Some cells of a mesh, numbers (k,) in every block, as `Cut.part` gives them."""
+def part_of(
+    mesh: Mesh, wanted: Sequence[Index], number: Index | None = None
+) -> tuple[Mesh | None, Index]:
+    """Some cells of a mesh, numbers (k,) in every block, as `Cut.part` gives them.
+
+    number (n,): of -1, which it has again afterwards; for many parts of one mesh.
+    """
     blocks = [
         replace(block, nodes=block.nodes[some])
         for block, some in zip(mesh.cells, wanted, strict=True)
@@ -86,10 +87,50 @@ def part_of(mesh: Mesh, wanted: Sequence[Index]) -> tuple[Mesh | None, Index]:
     ]
     if not blocks:
         return None, np.zeros(0, dtype=np.int64)
-    marked = np.zeros(len(mesh.points), dtype=bool)
-    for block in blocks:
-        marked[block.nodes] = True
-    used = np.flatnonzero(marked)
-    number = np.cumsum(marked) - 1
+    number = np.full(len(mesh.points), -1) if number is None else number
+    used = np.sort(np.concatenate([first_uses(block.nodes, number) for block in blocks]))
+    number[used] = np.arange(len(used))
     cells = tuple(replace(b, nodes=read_only(number[b.nodes])) for b in blocks)
+    number[used] = -1
     return Mesh.of_checked(mesh.points[used], cells, axisymmetric=mesh.axisymmetric), used
+
+
+@njit(cache=True)
+def cells_of_parts(nodes: Index, owner: Index, parts: int) -> tuple[Index, Index]:
+    """Cells (k, m) that touch each part, part after part, and where it starts, (parts + 1,)."""
+    starts = np.zeros(parts + 1, np.int64)
+    cells = np.empty(0, np.int64)
+    for fill in range(2):
+        used = starts[:-1].copy()
+        for cell in range(len(nodes)):
+            for k in range(nodes.shape[1]):
+                part = owner[nodes[cell, k]]
+                seen = False
+                for other in range(k):
+                    seen = seen or owner[nodes[cell, other]] == part
+                if seen:
+                    continue
+                if fill:
+                    cells[used[part]] = cell
+                    used[part] += 1
+                else:
+                    starts[part + 1] += 1
+        if not fill:
+            starts = np.cumsum(starts)
+            cells = np.empty(starts[-1], np.int64)
+    return cells, starts
+
+
+@njit(cache=True)
+def first_uses(nodes: Index, number: Index) -> Index:
+    """Nodes of cells (k, m) where number (n,) is negative; it is 0 there afterwards."""
+    out = np.empty(nodes.size, np.int64)
+    count = 0
+    for cell in range(len(nodes)):
+        for k in range(nodes.shape[1]):
+            node = nodes[cell, k]
+            if number[node] < 0:
+                number[node] = 0
+                out[count] = node
+                count += 1
+    return out[:count].copy()

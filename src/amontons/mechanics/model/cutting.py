@@ -194,7 +194,7 @@ def whole(model: Model) -> Whole:
         bodies, np.concatenate([body.mesh.points for body in bodies]), fixed,
         prescribed.reshape(-1, d),
         factor * external_load(bodies, model.loads, beside).reshape(-1, d),
-        near_nullspace(parts, np.arange(beside.total), beside.total), contacts, B,
+        near_nullspace(parts, slice(None), beside.total), contacts, B,
     )  # fmt: skip
 
 

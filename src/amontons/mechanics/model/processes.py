@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 from scipy import sparse
 
 from ...core.errors import InvalidInput, MissingDependency
-from ...core.memory import give_back
+from ...core.memory import trim
 from ...core.threads import asked, threads
 from ...linear.distributed import SpreadMatrix
 from ...linear.petsc import Petsc, mpi, petsc
@@ -64,11 +64,11 @@ def distributed(
     with ended_together(comm):
         together(comm, lambda: _check_options(tolerance, linear))
         share = _received(model, comm)
-        give_back()  # what the first one has needed for the whole mesh
+        trim()  # what the first one has needed for the whole mesh
         rows = [together(comm, lambda: _rows(share))]
         problem = _problem(share, rows, comm, linear or Petsc())
         share = replace(share, modes=share.modes[:0].copy())  # the matrix has them
-        give_back()  # blocks of which PETSc has made its matrix
+        trim()  # blocks of which PETSc has made its matrix
         found = SpreadActiveSet(problem).solve(float(tolerance))
         solution = DistributedSolution.of(share, problem, found, comm)
         problem.K.destroy()

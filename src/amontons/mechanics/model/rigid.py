@@ -190,7 +190,7 @@ def describe(modes: Array) -> str:
     return ", ".join(words)
 
 
-def near_nullspace(parts: list[Piece], free: Index, dofs: int) -> Array:
+def near_nullspace(parts: list[Piece], free: Index | slice, dofs: int) -> Array:
     """Rigid modes of every piece on the free dofs, (len(free), 3 or 6): for multigrid.
 
     Pieces share the columns: multigrid groups coupled nodes only, so it never mixes them.
