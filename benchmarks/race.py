@@ -3,13 +3,15 @@
     python benchmarks/race.py [--seed 7] [--cap 3] [--traces FILE] [--kept] [--tune COUNT]
     python benchmarks/race.py --unseen [...]
 
-The problems are those of `classes.py`; --unseen takes those on which no constant was chosen but
-those of plateaus, `Entry.again` and `Entry.trial` in the table of `solvers/auto/portfolio.py`,
-and these at other seeds.  Every track of the table in `solvers/auto/portfolio.py`
+The problems are those of `classes.py`; --unseen takes those by which no constant was chosen but
+those of plateaus and of what waits, `Entry.again`, `Entry.trial` and `Entry.waits` in the table
+of `solvers/auto/portfolio.py`, WINDOW and LULL in `race.py` there, and these at seeds 3, 7, 12
+and 31.  Every track of the table in `solvers/auto/portfolio.py`
 runs alone on each of them for at most `cap` CPU seconds, those of Newton's kind from 60
 accelerated sweeps, as in the race; the *oracle* is the fastest of them.  Auto is a whole solve,
 judge and bookkeeping included, for at most `cap` or PATIENCE times the oracle; like a track it
-is asked for the error in the sum.  CPU seconds, one thread, blocks and diagonal prepared.
+is asked for the error in the sum.  CPU seconds, one thread, blocks and diagonal prepared; what
+a method makes of them itself, as a symbolic factor, counts on both sides.
 
 --tune COUNT draws so many constants of the race at random and simulates it on the recorded
 traces, where tracks do not exchange reactions: the best for all classes, and for all but one,
@@ -80,12 +82,19 @@ about them, and on each class with those that are the best on all others.
 
 
 # ------------------------------------------------------------------------------ traces
+def prepared(problem):
+    """It, with all that is made before a solve: blocks, diagonal, norms."""
+    _ = problem.kernel_data, problem.q_norm, problem.blocks.eliminated
+    return problem
+
+
 def trace(problem, entry, cap):
     """What a track does alone: first error, CPU seconds before it, and after each chunk.
 
     Rows of CPU seconds, cost in ns by operations, best error, the error from which its rate is
     told, and the cost at which that began; None where it does not run.
     """
+    problem = prepared(problem.fresh())
     state = State(problem, Target(1e-8), np.zeros((problem.contacts, 3)))
     if not entry.when(state):
         return None
@@ -129,8 +138,7 @@ def solved(problem, tolerance, cap):
     """CPU seconds of Auto, infinite where it does not converge; what ended it; error."""
     best = (math.inf, "", math.inf)
     for _ in range(RUNS + 1):
-        fresh = problem.fresh()
-        _ = fresh.kernel_data, fresh.q_norm, fresh.blocks.eliminated
+        fresh = prepared(problem.fresh())
         began = time.process_time()
 
         def late(step, iterate, began=began):
@@ -157,14 +165,14 @@ def record(problems, cap, path):
         problem = given.condensed()
         if problem.contacts < 20:
             continue
-        _ = problem.kernel_data, problem.q_norm, problem.blocks.eliminated
+        prepared(problem)
         if not out:  # compile
             for entry in ALONE:
                 trace(problem, entry, 0.1)
             solved(problem, 1e-8, 1.0)
         state = State(problem, Target(1e-8), np.zeros((problem.contacts, 3)))
         row = {"kind": kind, "name": name, "contacts": problem.contacts, "traces": {},
-               "needs": {}, "trials": {}, "stacked": {}}  # fmt: skip
+               "needs": {}, "trials": {}, "waits": {}, "stacked": {}}  # fmt: skip
         fastest = math.inf
         for entry in ALONE:
             most = min(cap, max(0.2, 8 * fastest))
@@ -176,6 +184,8 @@ def record(problems, cap, path):
             fastest = min(fastest, crossing(found, 1e-8))
             if found is not None and entry.needs is not None:
                 row["needs"][entry.name] = entry.needs(state)
+            if found is not None and entry.waits is not None:
+                row["waits"][entry.name] = entry.waits(state)
             if found is not None and entry.trial is not None:
                 row["trials"][entry.name] = entry.trial(state)
             if found is not None and entry.stacked and state.is_stacked:
@@ -211,7 +221,18 @@ CONSTANTS = {
     "agains": {e.name: e.again for e in ALONE if e.trial is not None},
 }  # fmt: skip
 LAST = {e.name for e in ALONE if e.last}
-WAITS = {e.name for e in ALONE if e.waits}
+
+
+def fallen(first, rows):
+    """Cost at which what the rate is told from last fell, for each row of a trace."""
+    out, mark, since = [], (0.0, first), 0.0
+    for _, cost, _, path, begun in rows:
+        if begun != since:
+            mark, since = (cost, path), begun
+        if path < rules.FALL * mark[1]:
+            mark = cost, path
+        out.append(mark[0])
+    return out
 
 
 class Replay:
@@ -221,6 +242,7 @@ class Replay:
         self.first, self.rows, _ = found
         self.at = 0
         self.foreseen = math.inf  # the least cost at which it has promised the goal
+        self.falls = fallen(self.first, self.rows)
 
     @property
     def cost(self):
@@ -250,6 +272,11 @@ class Replay:
         rest = math.log(max(path / goal, 1.0))
         return rest * (self.cost - cost) / math.log(error / path)
 
+    @property
+    def lull(self):
+        """Cost since what its rate is told from last fell by a part of it."""
+        return self.cost - self.falls[self.at - 1] if self.at else 0.0
+
     def soon(self, goal):
         """Cost to the goal at the rate of the last chunk, see `rules.Track.soon`."""
         start = [0.0, 0.0, self.first]
@@ -262,7 +289,8 @@ class Replay:
         """Cost to the goal at its rate, more where it has broken promises."""
         rest = self.rate(goal, c["window"], c["first"])
         self.foreseen = min(self.foreseen, self.cost + rest)
-        return rest * max(1.0, self.cost / (c["grace"] * self.foreseen))
+        rest *= max(1.0, self.cost / (c["grace"] * self.foreseen))
+        return max(rest, rules.LULL * self.lull)
 
 
 def simulated(row, goal, c):
@@ -283,7 +311,7 @@ def simulated(row, goal, c):
             if name in LAST:
                 return needed if track.cost < c["shares"][name] * total else math.inf
             if track.cost < needed:
-                waits = name in WAITS and not track.at and spare() < needed
+                waits = not track.at and spare() < row["waits"].get(name, -math.inf)
                 return math.inf if waits else needed - track.cost
         promise = track.promise(goal, c)
         likely = c["nears"].get(name, 0.0) * mean

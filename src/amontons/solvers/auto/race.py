@@ -6,11 +6,12 @@ promises the goal for the least further cost:
     rest = ln(error / goal) (C - c) / ln(error(c) / error(C)),   c = (1 - WINDOW) C,
 
 C what the track has cost and error(c) its best error then: the rate of the last part of its own
-cost, a long one, which is patience.  Smoothing Newton begins at a point far worse than the one
-that it starts from, and its best error stands until it has come back: its rate is told from the
-error of where it is, the first time; once it had to begin again, that promises nothing.  Every
-chunk costs a call besides.  A track that has promised to be there at a cost F, and has not, is
-believed less: its rest counts C / (GRACE F) times.  Besides
+cost, a long one, which is patience; where its error stands, a multiple of how long it has done
+so at least.  Smoothing Newton begins at a point far worse than the one that it starts from, and
+its best error stands until it has come back: its rate is told from the error of where it is,
+the first time; once it had to begin again, that promises nothing.  Every chunk costs a call
+besides.  A track that has promised to be there at a cost F, and has not, is believed less: its
+rest counts C / (GRACE F) times.  Besides
 
     unknown     a track is taken to need some part, or multiple, of all that was spent while it
                 has had a small share of it; a method of Newton's kind what it usually needs
@@ -28,9 +29,9 @@ believed less: its rest counts C / (GRACE F) times.  Besides
                 the first chunk, unless the first track promises to be there for less, and has
                 what it usually needs before all others; where chunks are brief it waits with
                 the others, and comes before them
-    dear        smoothing Newton, and steps and sweeps in turn, begin where sweeps have cost as
-                much as all steps and what the new ones usually need: where none of them helps
-                these trials together cost no more than sweeps do
+    dear        the interior point, smoothing Newton, and steps and sweeps in turn, begin where
+                sweeps have cost as much as all steps and what smoothing Newton, or the latter,
+                usually need: where none helps these trials cost no more than sweeps do
     nothing     where no track promises anything, the one that has cost least
 
     the end     where five times as much was spent as when the best error, or that of a track
@@ -45,21 +46,19 @@ from __future__ import annotations
 
 import math
 from bisect import bisect_right
-from collections.abc import Callable, Generator
+from collections.abc import Callable
 from dataclasses import dataclass, field
 from operator import itemgetter
-from typing import NamedTuple
-
-import numpy as np
-from numpy.typing import NDArray
 
 from ...core.errors import SingularOperator
 from ..contract import Breakdown, Iterate, Iterates
+from .chunk import Chunk, Chunks, Done, Turn
 from .state import FIRST_CHUNKS, State, chunks_alone
 
-Array = NDArray[np.float64]
-WINDOW = 0.7  # last part of a track's cost from which its rate is told
+WINDOW = 0.6  # last part of a track's cost from which its rate is told
 GRACE = 1.2  # times the cost at which a track has promised the goal: its promise is broken
+# What an error that stands takes on, of how long it has; part of it that is no fall.
+LULL, FALL = 2.0, 0.9
 # Logarithm of the way to the goal, over that of the way to the best error, up to which that is
 # near; multiple of the best error at which it is taken to have been come by.
 NEAR, ALMOST = 1.5, 2.0
@@ -78,33 +77,6 @@ BESIDE = 10.0  # times the best error up to which a track's own progress counts 
 PAUSE, LEAST_PAUSE, MOST_PAUSE = 0.1, 1e6, 5e7
 
 
-class Chunk(NamedTuple):
-    """What a track has after a chunk: r (nc, 3), its iterations, cost in ns and operations.
-
-    flops None where they are not counted; error of r, unit of u, where it is known.  path: the
-    error of where a method has got to, unit of u, where r, the best that it has come by, does
-    not tell that.
-    """
-
-    r: Array
-    iterations: int
-    cost: float
-    flops: float | None = None
-    error: float = math.inf
-    linear_iterations: int = 0
-    path: float = math.inf
-
-
-class Turn(NamedTuple):
-    """What a track is sent: what a chunk may cost, in ns, and its best error, unit of u."""
-
-    cost: float
-    error: float
-
-
-Chunks = Generator[Chunk, Turn, None]
-
-
 @dataclass(frozen=True)
 class Entry:
     """A row of the table of tracks: chunks(state) where when(state) holds.
@@ -117,7 +89,8 @@ class Entry:
     at all.  again, trial: it is taken to need at most `again` times what it has cost, or what
     trial(state), nanoseconds, says that a trial costs where that is more; no bound where trial
     is None.  stacked: Newton steps that it usually takes on stacks of rigid blocks, where it
-    comes second; 0: it comes with the others.  waits: it is dear.
+    comes second; 0: it comes with the others.  waits: nanoseconds that sweeps have to have cost
+    more than methods of Newton's kind before it begins.
     """
 
     name: str
@@ -131,7 +104,7 @@ class Entry:
     again: float = math.inf
     trial: Callable[[State], float] | None = None
     stacked: int = 0
-    waits: bool = False
+    waits: Callable[[State], float] | None = None
 
 
 @dataclass(eq=False)
@@ -149,6 +122,7 @@ class Track:
     promise: float = math.inf  # nanoseconds to the goal at its rate
     foreseen: float = math.inf  # the least cost at which it has promised the goal
     mark: float = math.inf  # its error when that last halved
+    fell: tuple[float, float] = (0.0, math.inf)  # of `path`, where it last fell
 
     def advance(self, growth: float = GROWTH) -> Chunk | None:
         """A chunk, its reaction taken by the state; None where the method has ended.
@@ -160,6 +134,7 @@ class Track:
             next(self.chunks)
             self.errors.append(self.state.first_error)
             self.path.append((0.0, self.state.first_error))
+            self.fell = self.path[0]
         try:
             turn = Turn(max(growth * self.cost, SHORTEST), self.errors[-1])
             chunk = self.chunks.send(turn)
@@ -187,11 +162,12 @@ class Track:
             if entry.last:
                 return needed if self.cost < entry.share * total else math.inf
             if self.cost < needed:
-                waits = entry.waits and not self.errors and spare < needed
-                return math.inf if waits else needed - self.cost
-        promise = self.promise
-        if self.cost > GRACE * self.foreseen:
-            promise *= self.cost / (GRACE * self.foreseen)
+                waits = None if self.errors else entry.waits
+                if waits is not None and spare < waits(self.state):
+                    return math.inf
+                return needed - self.cost
+        broken = max(1.0, self.cost / (GRACE * self.foreseen))
+        promise = max(broken * self.promise, LULL * (self.cost - self.fell[0]))
         if self.cost < entry.near * way:
             promise = min(promise, entry.near * way - self.cost)
         if entry.trial is not None:
@@ -229,8 +205,11 @@ class Track:
         if along is not self.along:
             self.along = along
             self.path.clear()
+            self.fell = 0.0, math.inf
         best = self.path[-1][1] if self.path else math.inf
         self.path.append((self.cost, min(chunk.path, best) if along else self.errors[-1]))
+        if self.path[-1][1] < FALL * self.fell[1]:
+            self.fell = self.path[-1]
 
     def _at_its_rate(self) -> float:
         if len(self.path) <= FIRST_CHUNKS:
@@ -244,24 +223,6 @@ class Track:
             return 0.0
         rate = math.log(higher / error) / (cost - before)
         return math.log(error / self.state.goal) / rate
-
-
-@dataclass(eq=False)
-class Done:
-    """What tracks have done since the last iterate, and the last of them."""
-
-    iterations: int = 0
-    flops: float | None = 0.0  # None where one does not count them
-    linear_iterations: int = 0
-    stage: str = ""
-
-    def add(self, chunk: Chunk, stage: str) -> None:
-        """Count a chunk in."""
-        self.iterations += chunk.iterations
-        self.linear_iterations += chunk.linear_iterations
-        if self.flops is not None:
-            self.flops = None if chunk.flops is None else self.flops + chunk.flops
-        self.stage = stage
 
 
 def whole_way(fall: list[tuple[float, float]], goal: float, near: float = NEAR) -> float:

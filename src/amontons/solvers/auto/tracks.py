@@ -25,7 +25,7 @@ from ..newton.smoothing import SmoothingNewton
 from ..sweeps.kernels import Acceleration, counted, sweep_data, watch_for
 from ..sweeps.momentum import Momentum
 from ..sweeps.shared import sweeps as shared_sweeps
-from .race import Chunk, Chunks
+from .chunk import Chunk, Chunks
 from .state import State
 
 Array = NDArray[np.float64]
