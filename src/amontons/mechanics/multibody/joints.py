@@ -16,7 +16,8 @@ friction, though equilibrium of rigid bodies does not say which part of the load
 which the joints; `undetermined` names it.
 
 Joints are closed at the end of a step by impulses of its middle, which Newton's method finds
-for joints alone from the free turning of their bodies (`bonds.closed_by`). Of a body that turns
+for joints alone from the free turning of their bodies (`bonds.closed_by`), and solves of the
+step beside contacts that hang on them (`bonds.aimed`). Of a body that turns
 by an angle 2 p about an axis, the arms R_m X get those of the chord, the mean of R0 X and R1 X
 by tan(p) / p across the axis: with them a plane motion has u1 = -u_m and closes. In space what
 is left gives velocities c, of third order in h, and u1 = c - u_m. (With c = 0 and arms of the
@@ -37,6 +38,7 @@ from ...solvers.newton.block_lu import analyse_pattern
 from .bodies import GROUND, RigidBodies
 from .bonds import (
     Pattern,
+    aimed,
     closed_by,
     factorised,
     global_inverse,
@@ -143,6 +145,17 @@ class Joints:
             rotations(begin), middle, v, h, gravity,
         )  # fmt: skip
         return Rows(*rows), r, c
+
+    def aimed(
+        self, at: Rows, r: Array, begin: Array, middle: tuple[Any, ...], v: Array, h: float,
+        gravity: Array,
+    ) -> tuple[Rows, Array, Array]:  # fmt: skip
+        """Rows of chords and c (k, 3) that close joints beside r of all rows; sides apart."""
+        rows, c, apart = aimed(
+            tuple(at), tuple(self.rows(middle[0], middle[2])[0]), self.pattern, self.anchors,
+            self.bodies, rotations(begin), middle, v, h, gravity, r,
+        )  # fmt: skip
+        return Rows(*rows), c, apart
 
     def bonds(self, rows: Rows, R: Array) -> tuple[tuple[Any, ...], Array]:
         """What contacts hang on, see `Hung`, and the inverse inertia of bodies turned by R."""

@@ -21,12 +21,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...core.clock import now
+from ...problem.friction import FrictionProblem
 from ...problem.judge.measures import natural_error
 from ...problem.law.law import COULOMB, TIED
 from ...solvers.judging import BLUR
 from ...solvers.newton.body_relaxation import BodyMatrix, body_matrix, relaxed
 from ...solvers.sweeps.on_bodies import driven_inplace, felt_inplace
-from .quick import Found, Posed, eliminated_of, solved
+from .quick import Found, Posed, eliminated_of, law_of, solved
 from .rows import Mobility, Rows, levers_of
 
 Array = NDArray[np.float64]
@@ -98,6 +99,12 @@ class Search:
     def relaxation_cost(self) -> float:
         """Nanoseconds of a usual relaxation."""
         return USUAL * (STEP * len(self.posed.q) + PRODUCT * self.matrix.products)
+
+    @property
+    def problem(self) -> FrictionProblem:
+        """The same for the solvers, who cannot write to it."""
+        n = len(self.posed.q)
+        return self.posed.problem(law_of(self.contacts, n - self.contacts, self.mu))
 
     # ------------------------------------------------------------------ what it does
     def sweep(self, start: Array, plain: int, momentum: int) -> Found | None:
