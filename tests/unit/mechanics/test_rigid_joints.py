@@ -9,6 +9,7 @@ from scipy import integrate
 import amontons as am
 from amontons.mechanics.multibody import GROUND, Joint, RigidBodies, RigidBody, cuboid
 from amontons.mechanics.multibody.guides import Guides
+from amontons.mechanics.multibody.joints import Joints
 from amontons.mechanics.multibody.rows import Rows
 
 FLOOR = am.Plane((0, 0, 1))
@@ -271,6 +272,20 @@ def lying_chain(n):
 def test_what_stands_still_loses_no_energy(system, until):
     """What is lost there is an error of solves; any part of nothing was much."""
     assert [w for s in run(system, 1e-3, until) for w in s.warnings] == []
+
+
+def test_contacts_of_parts_that_move_whole_are_never_decided(monkeypatch):
+    """Which is told of masses alone; joints that were asked say the same."""
+
+    def decided():
+        system = replace(portal(), joints=[*portal().joints, Joint(0, GROUND, (0, 0, 0))])
+        steps = [run(each, 1e-3, 2e-3)[-1] for each in (portal(), lying_chain(4), system)]
+        return [(len(step.r), len(step.warnings)) for step in steps]
+
+    found = decided()
+    monkeypatch.setattr(Joints, "_carried", lambda self, at, _: np.zeros(len(at.slave), bool))
+    assert decided() == found
+    assert found[0][0] == found[2][0] == 8
 
 
 def test_a_motion_given_later_may_be_jolted():

@@ -37,6 +37,10 @@ something back: u1 = 0 then, which bodies at rest always have.  What joints deci
 no contact, and where they decide the normal alone it is one for the sake of its friction.
 Overlaps of both kinds are left: mending them would contradict the joints.
 
+Turning lifts a contact by the square of its angle in a step, where it takes no part until loads
+have brought it down again.  One that loses its load at a constant rate stays up for ever when
+that takes longer than the load is left, from a time of order sqrt(h) before it.
+
 Gravity that changes in time is that of the middle of a step.
 
 Energies: kinetic + potential gain what contacts do, r . (u0 + u1) / 2, what the mending of

@@ -38,9 +38,10 @@ LONGEST = 1000  # after relaxations that have not helped
 STEPS = 60  # of a relaxation at most
 ROUNDS = 30  # relaxations before the solvers are asked
 PATIENCE = 5  # of them without halving the error
-# Nanoseconds, only ratios count: of a sweep per contact; of a step of a relaxation per contact
-# and per product of blocks; of a relaxation at most, beyond which packings in space fill in.
-SWEEP, STEP, PRODUCT, MOST = 120.0, 900.0, 12.0, 4e9
+# Nanoseconds, only ratios count: of a plain sweep per block of W; of a sweep with momentum per
+# contact; of a step of a relaxation per contact and per product of blocks; of a relaxation at
+# most, beyond which packings in space fill in.
+BLOCK, SWEEP, STEP, PRODUCT, MOST = 30.0, 120.0, 900.0, 12.0, 4e9
 USUAL = 40  # steps of a relaxation
 NO_LEVERS, NO_SIDES = np.zeros((0, 2, 3, 6)), np.zeros((0, 2), np.int64)
 
@@ -169,8 +170,11 @@ class Search:
 
 def found_quickly(search: Search) -> tuple[Found | None, Array]:
     """What is found, None where the tolerance is not met; and the best impulses (n, 3)."""
-    plain = WORK // max(len(search.posed.indices), 1)
+    blocks = max(len(search.posed.indices), 1)
+    plain = WORK // blocks
     if plain >= FEWEST:
+        worth = int(USUAL * STEP * len(search.posed.q) / (BLOCK * blocks))
+        plain = min(plain, max(FEWEST, worth))  # what a relaxation costs at least
         found = search.sweep(search.r, plain, 0)
         if found is not None:
             return found, found.r
