@@ -9,6 +9,7 @@ from scipy import integrate
 import amontons as am
 from amontons.mechanics.multibody import GROUND, Joint, RigidBodies, RigidBody, cuboid
 from amontons.mechanics.multibody.guides import Guides
+from amontons.mechanics.multibody.joints import Joints
 from amontons.mechanics.multibody.rows import Rows
 
 FLOOR = am.Plane((0, 0, 1))
@@ -94,9 +95,12 @@ def light_crank(phi=-0.5, speed=20.0, r=0.1, rod=0.3):
 
 
 def test_what_joints_lose_by_long_steps_is_of_third_order_and_told():
-    """Energy is kept in truth; over the dead centre the crank turns by 0.1 rad in a step."""
+    """Energy is kept in truth; over the dead centre the crank turns by 0.2 rad in a step.
+
+    Its slider hangs in a guide: joints that were not closed beside contacts lost 3 % at 1 ms.
+    """
     lost = []
-    for step in (1e-3, 5e-4):
+    for step in (2e-3, 1e-3, 5e-4):
         steps = run(light_crank(), step, 0.032, tolerance=1e-9)
         E = energy(steps)
         lost.append(1 - E[-1] / E[0])
@@ -104,9 +108,74 @@ def test_what_joints_lose_by_long_steps_is_of_third_order_and_told():
         assert works == pytest.approx(E[-1] - E[0], rel=1e-9)
         assert max(abs(s.energies.defect) for s in steps) < 1e-12 * E[0]
         names = [w.name for s in steps for w in s.warnings]
-        assert names == (["joints-lose-energy"] if step == 1e-3 else [])
+        assert names == (["joints-lose-energy"] if step == 2e-3 else [])
     assert lost[0] > 0.01
-    assert lost[0] > 5 * lost[1]  # contacts of the guide are of first order
+    assert 0 < lost[1] < 0.008
+    assert 0 < 6 * lost[2] < lost[1]
+
+
+def crank_stopped_by_friction(system, mu, until, phi=-0.5, speed=20.0, r=0.1, rod=0.3):
+    """Where the slider comes to rest by Newton's laws of three bodies in a plane."""
+    crank, bar, slider = system.bodies
+    g = -system.gravity[2]
+
+    def rate(_, y):
+        """Of angle and speed, from forces T of crank on rod and F of rod on slider."""
+        c, s, w = np.cos(y[0]), np.sin(y[0]), y[1]
+        psi = np.arcsin(r * s / rod)
+        sine, cosine = r * s / rod, np.cos(psi)
+        swing = r * c * w / (rod * cosine)  # psi'
+        # psi'' = a w' + b; the rod is below the tip by its sine
+        a, b = r * c / (rod * cosine), (-r * s * w**2 + rod * sine * swing**2) / (rod * cosine)
+        tip = r * np.array([[-s, -c * w**2], [c, -s * w**2]])  # by w' and the rest
+        d = rod * np.array([[-sine * a, -sine * b - cosine * swing**2],
+                            [-cosine * a, -cosine * b + sine * swing**2]])  # fmt: skip
+        end, mid = tip + d, tip + d / 2
+        way = np.sign(-r * s * w - rod * sine * swing)
+        M = np.zeros((5, 5))  # w', Tx, Tz, Fx, Fz
+        f = np.zeros(5)
+        M[0, :3] = crank.inertia[1, 1] + crank.mass * r**2 / 4, -r * s, r * c
+        f[0] = -crank.mass * g * r / 2 * c
+        M[1], f[1] = [bar.mass * mid[0, 0], -1, 0, 1, 0], -bar.mass * mid[0, 1]
+        M[2], f[2] = [bar.mass * mid[1, 0], 0, -1, 0, 1], -bar.mass * (mid[1, 1] + g)
+        M[3] = [bar.inertia[1, 1] * a, *(rod / 2 * np.array([-sine, -cosine, -sine, -cosine]))]
+        f[3] = -bar.inertia[1, 1] * b
+        M[4] = [slider.mass * end[0, 0], 0, 0, -1, -way * mu]
+        f[4] = -slider.mass * (end[0, 1] + way * mu * g)
+        return [w, np.linalg.solve(M, f)[0]]
+
+    def stopped(_, y):
+        return y[1] - 1e-6
+
+    stopped.terminal = True
+    y = integrate.solve_ivp(rate, (0, until), [phi, speed], events=stopped, rtol=1e-9,
+                            atol=1e-11).y[0, -1]  # fmt: skip
+    return r * np.cos(y) + np.sqrt(rod**2 - (r * np.sin(y)) ** 2)
+
+
+def test_a_crank_whose_slider_rubs_stops_as_newton_says():
+    """To second order in the step, whose joints close beside the contacts of the slider."""
+    system = replace(light_crank(), planes=[am.Plane((0, 0, 1), (0, 0, -0.15))], mu=0.3,
+                     gravity=(0, 0, -20 * G))  # fmt: skip
+    expected = crank_stopped_by_friction(system, 0.3, 0.032)
+    missed = [abs(run(system, step, 0.032, tolerance=1e-8)[-1].position[2, 0] - expected)
+              for step in (2e-3, 1e-3)]  # fmt: skip
+    assert missed[1] < 1e-4
+    assert missed[0] > 3 * missed[1]
+
+
+def test_a_wedged_rod_stays():
+    """A hinge and two planes hold it, which friction jams: no step ends in NotConverged."""
+    planes = [FLOOR, am.Plane((-1, 0, 0), (1.001, 0, 0))]
+    planes.append(am.Plane((-0.3, 0, -1), (1, 0, 0.101)))
+    rod = RigidBody(cuboid((1, 0.1, 0.1)), 1000, (0.5, 0, 0.05), velocity=(0, 0, 1),
+                    spin=(0, -2, 0))  # fmt: skip
+    joints = [Joint(0, GROUND, (0, y, 0.05)) for y in (-0.05, 0.05)]
+    steps = run(RigidBodies([rod], planes, mu=0.2, joints=joints), 1e-3, 0.05)
+    E = energy(steps)
+    assert np.diff(E).max() < 1e-6 * E[0]
+    assert np.abs(steps[-1].state.motion.velocity).max() < 1e-5  # a step gives 1e-2
+    np.testing.assert_allclose(steps[-1].position[0], (0.5, 0, 0.05), atol=2e-3)
 
 
 @pytest.mark.parametrize(("turning", "told"), [(1000.0, True), (300.0, False)])
@@ -203,6 +272,20 @@ def lying_chain(n):
 def test_what_stands_still_loses_no_energy(system, until):
     """What is lost there is an error of solves; any part of nothing was much."""
     assert [w for s in run(system, 1e-3, until) for w in s.warnings] == []
+
+
+def test_contacts_of_parts_that_move_whole_are_never_decided(monkeypatch):
+    """Which is told of masses alone; joints that were asked say the same."""
+
+    def decided():
+        system = replace(portal(), joints=[*portal().joints, Joint(0, GROUND, (0, 0, 0))])
+        steps = [run(each, 1e-3, 2e-3)[-1] for each in (portal(), lying_chain(4), system)]
+        return [(len(step.r), len(step.warnings)) for step in steps]
+
+    found = decided()
+    monkeypatch.setattr(Joints, "_carried", lambda self, at, _: np.zeros(len(at.slave), bool))
+    assert decided() == found
+    assert found[0][0] == found[2][0] == 8
 
 
 def test_a_motion_given_later_may_be_jolted():

@@ -16,7 +16,7 @@ from amontons.mechanics.multibody import (
     RigidBody,
     cuboid,
     evolve_rigid,
-    moving,
+    solving,
 )
 from amontons.solvers.driver import drive_as_asked
 
@@ -99,7 +99,7 @@ def test_the_mending_of_overlaps_is_limited_in_time_and_judged(monkeypatch):
         seen.append(asked.deadline)
         return drive_as_asked(problem, replace(asked, max_iterations=1), *rest)
 
-    monkeypatch.setattr(moving, "drive_as_asked", stopped)
+    monkeypatch.setattr(solving, "drive_as_asked", stopped)
     balls = [RigidBody(Ball(0.1), position=(0.17 * k, 0, 0.1)) for k in range(3)]
     system, asked = RigidBodies(balls, [FLOOR]), {"step": 1e-3, "until": 1e-3}
     asked |= {"solver": am.GaussSeidel(), "deadline": deadline}

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 import amontons as am
-from amontons.mechanics.multibody import moving, sweeping
+from amontons.mechanics.multibody import solving, sweeping
 from amontons.mechanics.multibody.quick import Found
 from amontons.mechanics.multibody.sweeping import Search
 
@@ -28,7 +28,7 @@ def searches(monkeypatch):
             super().__post_init__()
             made.append(self)
 
-    monkeypatch.setattr(moving, "Search", Kept)
+    monkeypatch.setattr(solving, "Search", Kept)
     monkeypatch.setattr(sweeping, "WORK", 0)
     return made
 

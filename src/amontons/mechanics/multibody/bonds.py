@@ -190,8 +190,7 @@ def closed_by(rows, pattern, anchors, bodies, begin, middle, v, h, gravity):  # 
             failed,
         )  # fmt: skip
         if stage == 0:
-            chord = (slave, master, axes, _chords(slave, arms, anchors[0], begin, ended),
-                     _chords(master, others, anchors[1], begin, ended))  # fmt: skip
+            chord = _chord_rows(rows, anchors, begin, ended)
             for j in range(k):
                 if failed[linked[j]]:
                     chord[3][j], chord[4][j] = arms[j], others[j]
@@ -204,6 +203,38 @@ def closed_by(rows, pattern, anchors, bodies, begin, middle, v, h, gravity):  # 
         if failed[linked[j]]:
             c[j] = 0.0
     return chord, r, c
+
+
+@njit(cache=True, error_model="numpy")
+def aimed(rows, joints, pattern, anchors, bodies, begin, middle, v, h, gravity, r):  # noqa: PLR0913
+    """What closes joints beside impulses r of all rows: their chords, c (k, 3), sides apart.
+
+    rows: contacts and joints that r belongs to; joints: those of joints in the middle; the rest
+    as in `closed_by`.  c is what the chords have of velocities after r, less what parts the
+    sides at the end, as far as joints can give it; apart (k, 3): the sides then.
+    """
+    slave, master = joints[0], joints[1]
+    x, Q, R, spun = middle
+    inverse = global_inverse(R, bodies[2])
+    omega = to_global(R, spun)
+    after, turning = _pushed(rows, r, bodies[0], inverse, v + h * gravity, omega)
+    turned, _ = turned_freely(bodies[1], bodies[2], Q, to_own(R, turning), 0.5 * h)
+    ended = rotations(turned)
+    _, apart = joint_rows(slave, master, anchors, x + 0.5 * h * after, ended)
+    chord = _chord_rows(joints, anchors, begin, ended)
+    factor = factorised(chord, pattern, bodies[0], inverse)
+    mended = solved_bonds(pattern, factor, -2 / h * apart)
+    after, turning = _pushed(chord, mended, bodies[0], inverse, after, turning)
+    c = _doubled(chord, v, after, 0.5 * (omega + turning))
+    return chord, c, apart
+
+
+@njit(cache=True, error_model="numpy")
+def _chord_rows(rows, anchors, begin, ended):
+    """Rows of joints with the arms of the chords from rotations where a step begins."""
+    slave, master, axes, arms, others = rows
+    return (slave, master, axes, _chords(slave, arms, anchors[0], begin, ended),
+            _chords(master, others, anchors[1], begin, ended))  # fmt: skip
 
 
 @njit(cache=True, error_model="numpy")

@@ -16,7 +16,8 @@ friction, though equilibrium of rigid bodies does not say which part of the load
 which the joints; `undetermined` names it.
 
 Joints are closed at the end of a step by impulses of its middle, which Newton's method finds
-for joints alone from the free turning of their bodies (`bonds.closed_by`). Of a body that turns
+for joints alone from the free turning of their bodies (`bonds.closed_by`), and solves of the
+step beside contacts that hang on them (`bonds.aimed`). Of a body that turns
 by an angle 2 p about an axis, the arms R_m X get those of the chord, the mean of R0 X and R1 X
 by tan(p) / p across the axis: with them a plane motion has u1 = -u_m and closes. In space what
 is left gives velocities c, of third order in h, and u1 = c - u_m. (With c = 0 and arms of the
@@ -37,6 +38,7 @@ from ...solvers.newton.block_lu import analyse_pattern
 from .bodies import GROUND, RigidBodies
 from .bonds import (
     Pattern,
+    aimed,
     closed_by,
     factorised,
     global_inverse,
@@ -86,19 +88,24 @@ class Joints:
     def __init__(self, system: RigidBodies, masses: tuple[Array, Array, Array]) -> None:
         self.bodies = masses
         bodies, joints = system.bodies, system.joints
-        self.first = np.array([joint.first for joint in joints], dtype=np.int64)
+        first = np.array([joint.first for joint in joints], dtype=np.int64)
+        self.first = first
         self.second = np.array([joint.second for joint in joints], dtype=np.int64)
         self.jointed = np.zeros(len(bodies) + 1, dtype=bool)  # the last one is the ground
         self.jointed[self.first] = True
         self.jointed[self.second[self.second != GROUND]] = True
         pairs = self.first, np.where(self.second == GROUND, self.first, self.second)
         graph = sparse.coo_array((np.ones(len(joints)), pairs), (len(bodies), len(bodies)))
-        groups = connected_components(graph, directed=False)[1][self.first]
-        linked = np.unique(groups, return_inverse=True)[1]  # its part, of each joint
+        groups = connected_components(graph, directed=False)[1]
+        linked = np.unique(groups[first], return_inverse=True)[1]  # its part, of each joint
+        self.groups = np.append(groups, GROUND)
+        light = 1 / np.bincount(groups, masses[0])
+        light[groups[first[self.second == GROUND]]] = 0.0
+        self.light = np.append(light[groups], 0.0)  # 1 / mass of a body's part, 0 where held
         x = np.array([body.position for body in bodies])
         R = rotations(np.array([body.orientation for body in bodies]))
         point = np.array([joint.point for joint in joints], dtype=float).reshape(-1, 3)
-        first, second, on_ground = self.first, self.second, self.second == GROUND
+        second, on_ground = self.second, self.second == GROUND
         own = np.einsum("jki,jk->ji", R[first], point - x[first])
         other = np.einsum("jki,jk->ji", R[second], point - x[second])
         self.anchors = own, np.where(on_ground[:, None], point, other)
@@ -144,6 +151,17 @@ class Joints:
         )  # fmt: skip
         return Rows(*rows), r, c
 
+    def aimed(
+        self, at: Rows, r: Array, begin: Array, middle: tuple[Any, ...], v: Array, h: float,
+        gravity: Array,
+    ) -> tuple[Rows, Array, Array]:  # fmt: skip
+        """Rows of chords and c (k, 3) that close joints beside r of all rows; sides apart."""
+        rows, c, apart = aimed(
+            tuple(at), tuple(self.rows(middle[0], middle[2])[0]), self.pattern, self.anchors,
+            self.bodies, rotations(begin), middle, v, h, gravity, r,
+        )  # fmt: skip
+        return Rows(*rows), c, apart
+
     def bonds(self, rows: Rows, R: Array) -> tuple[tuple[Any, ...], Array]:
         """What contacts hang on, see `Hung`, and the inverse inertia of bodies turned by R."""
         factor, inverse = self.factor(rows, R)
@@ -159,11 +177,22 @@ class Joints:
         levers, sides = levers_of(*contacts, self.bodies[0], inverse), sides_of(contacts)
         loose = np.ones(len(theirs), dtype=bool)
         normals, tangents = levers[:, :, :1], levers[:, :, 1:]
-        loose[theirs] = self._left(normals, sides, theirs, bonds)[:, 0]
+        asked = theirs & ~self._carried(contacts, normals)
+        loose[asked] = self._left(normals, sides, asked, bonds)[:, 0]
         idle = ~loose
         if mu > 0 and idle.any():
             idle[idle] = ~self._left(tangents, sides, idle, bonds).any(axis=1)
         return Hung(np.ascontiguousarray(normals[:, :, 0]), sides, bonds, loose, idle)
+
+    def _carried(self, contacts: Rows, normals: Array) -> NDArray[np.bool_]:
+        """Contacts (n,) whose slave, or master, moves along the normal with all linked to it.
+
+        Joints leave 1 / mass of such a part of |g|^2 at least.
+        """
+        one, other = contacts.slave, contacts.master
+        least = np.maximum(self.light[one], self.light[other])
+        whole = np.einsum("nsme,nsme->n", normals, normals)
+        return (self.groups[one] != self.groups[other]) & (least > DECIDED * whole)
 
     def _left(
         self, levers: Array, sides: Index, those: NDArray[np.bool_], bonds: tuple[Any, ...]

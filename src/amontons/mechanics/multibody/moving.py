@@ -31,9 +31,15 @@ contacts, takes from a pendulum a part of its energy of first order: 7 % in five
 steps each.) What joints take at the beginning of a step is all of a jolt, and else of third
 order in the whole.
 Contacts may take part in the motion by which joints are mirrored, or one near a joint would
-stop or throw the body; what joints decide altogether is no contact, and where they decide the
-normal alone it is one for the sake of its friction.  Overlaps of both kinds are left: mending
-them would contradict the joints.
+stop or throw the body; then the step is solved again with chords and c from what parts there
+(`mirrored.closed_beside`).  Friction that jams a contact has no answer with joints that take
+something back: u1 = 0 then, which bodies at rest always have.  What joints decide altogether is
+no contact, and where they decide the normal alone it is one for the sake of its friction.
+Overlaps of both kinds are left: mending them would contradict the joints.
+
+Turning lifts a contact by the square of its angle in a step, where it takes no part until loads
+have brought it down again.  One that loses its load at a constant rate stays up for ever when
+that takes longer than the load is left, from a time of order sqrt(h) before it.
 
 Gravity that changes in time is that of the middle of a step.
 
@@ -48,7 +54,6 @@ scheme, to rounding.
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -56,24 +61,21 @@ from numpy.typing import NDArray
 
 from ...core.arrays import finite, number
 from ...core.clock import NEVER, Deadline
-from ...core.errors import Interrupted, InvalidInput, NotConverged, shown
+from ...core.errors import InvalidInput, shown
 from ...core.warned import ResultWarning
-from ...problem.protocol import Problem
 from ...problem.solution import FrictionSolution
 from ...solvers.asked import Asked
-from ...solvers.contract import Iterate, Solver
-from ...solvers.driver import drive_as_asked
+from ...solvers.contract import Solver
 from .bodies import RigidBodies
 from .ends import ended, middle_of
-from .guides import Guides, least_squeezed
+from .guides import Guides
 from .joints import Joints
 from .meeting import meetings
 from .met import Met
-from .mirrored import closed, mirror_inplace
-from .quick import Found, Posed, law_of, matched, pose
+from .mirrored import Halfway, closed_beside
+from .quick import Found, Posed, matched
 from .rolling import couples, rolling_problem
 from .rows import (
-    Mobility,
     Rows,
     delassus,
     global_inverse,
@@ -83,6 +85,7 @@ from .rows import (
     to_global,
     to_own,
 )
+from .solving import Solved, Solving
 from .states import (
     Motion,
     RigidEnergies,
@@ -92,7 +95,6 @@ from .states import (
     too_long,
     undetermined,
 )
-from .sweeping import Search, found_quickly
 
 Array = NDArray[np.float64]
 Index = NDArray[np.int64]
@@ -171,11 +173,6 @@ def at_start(system: RigidBodies) -> RigidState:
     )
 
 
-def _timed(deadline: Deadline) -> bool:
-    """True where work is counted, or time is over."""
-    return deadline is not NEVER and (deadline.work is not None or deadline.passed)
-
-
 class _Stepping:
     """A system with what all steps share."""
 
@@ -184,14 +181,14 @@ class _Stepping:
         solver: Solver | None, check: bool,
     ) -> None:  # fmt: skip
         self.system, self.h, self.overlap, self.asked = system, step, overlap, asked
-        self.solver, self.check = solver, check
         masses = np.array([body.mass for body in system.bodies])
         inertia = np.array([body.inertia for body in system.bodies])
         self.inverse: Array = np.linalg.inv(inertia)
         self.bodies = masses, inertia, self.inverse
         self.no_couples = np.zeros((len(masses), 3))
         self.near = TOUCHING * system.packed.reach
-        self.guides = Guides.of(system.packed.planes[:, :3])
+        guides = Guides.of(system.packed.planes[:, :3])
+        self.solving = Solving(system.mu, guides, asked, solver, check)
         self.joints = Joints(system, self.bodies) if len(system.joints) else None
         self.told = False  # that friction is undetermined
 
@@ -218,32 +215,20 @@ class _Stepping:
                 at = self._rows(middle[0], middle[2], sides, angle**2 * reach)
             else:
                 at = self._closed(at, gaps)
-        R, spun, nc = middle[2], middle[3], len(at.keys)
-        mobility = masses, global_inverse(R, self.inverse)
-        free = before.velocity + h * gravity, spun
-        solved, r, moments, turn, worked = None, np.zeros((0, 3)), NOTHING, self.no_couples, 0.0
+        mobility = masses, global_inverse(middle[2], self.inverse)
+        half = Halfway(before, middle, h, gravity, mobility, self.system.restitution, state)
+        solved, r, moments, turn = None, NOTHING, NOTHING, self.no_couples
+        worked, nc = 0.0, len(at.keys)
         if len(at.rows.slave):
-            pull = closing = NOTHING
-            if self.joints is not None:
-                at, pull, closing = closed(self.joints, at, before, middle, h, gravity)
-            posed = Posed(*pose(
-                at.rows, nc, (*mobility, R), (before.velocity, spun), free,
-                self.system.restitution, at.keys, (state.keys, state.impulses),
-            ))  # fmt: skip
-            if self.joints is not None:
-                mirror_inplace(at, middle, before.velocity, pull, closing, posed)
             what = f"step {state.index + 1}"
             if self.system.has_moments:
-                posed = self._unsqueezed(at.rows, mobility, posed, nc, deadline)
-                omega = to_global(R, spun)
-                solved = self._rolled(at, mobility, posed, omega, state, what, deadline)
+                solved = self._rolled(at, half, what, deadline)
                 r, moments = solved.r[:, :3].copy(), solved.r[:, 3:].copy()
                 turn = couples(at.rows, moments, len(masses))
             else:
-                solved = self._solve(at.rows, mobility, posed, nc, what, deadline)
+                at, solved, closing = self._struck(at, half, what, deadline)
                 r = solved.r if isinstance(solved, Found) else solved.r.copy()
-                if self.joints is not None:
-                    worked = 0.5 * float(np.sum(r[nc:] * closing))
+                worked = 0.5 * float(np.sum(r[nc:] * closing))
         motion, energies = ended(
             at.rows, r, turn, middle, self.bodies, gravity, h, begin, tuple(before)
         )
@@ -296,6 +281,8 @@ class _Stepping:
         if hung is None:
             return Met(found, keys, both, sides, None, max(deepest, widest))
         at = Met(found, keys, both, sides, hung, 0.0).only(~hung.idle)
+        if not len(at.keys):
+            return at._replace(hung=None, deepest=widest)
         gaps = at.found.gaps[at.loose]
         return at._replace(deepest=max(-gaps.min(initial=0.0), widest))
 
@@ -307,64 +294,43 @@ class _Stepping:
         return at._replace(found=found._replace(gaps=gaps), deepest=0.0).only(kept)
 
     # ------------------------------------------------------------------ problems
-    def _solve(
-        self, rows: Rows, mobility: Mobility, posed: Posed, nc: int, what: str,
-        deadline: Deadline,
-    ) -> Found | FrictionSolution:  # fmt: skip
-        """The impulses of a step, `what` for messages.
+    def _struck(
+        self, at: Met, half: Halfway, what: str, deadline: Deadline
+    ) -> tuple[Met, Solved, Array]:
+        """Contacts and joints as they are solved, with the impulses of a step, and c (k, 3)."""
+        if self.joints is None:
+            posed, closing = half.posed(at), NOTHING
+        else:
+            at, posed, closing = half.closed(self.joints, at)
+        solving, mobility = self.solving, half.mobility
+        posed = solving.unsqueezed(at, mobility, posed, deadline)
+        search = solving.search(at, mobility, posed)
+        if self.joints is None or at.hung is None:
+            return at, solving.solve(search, what, deadline), closing
+        solved = solving.tried(search, deadline, solvers=True)
+        if solved is None:  # friction that jams a contact lets joints take nothing back
+            posed, closing = half.still(at)
+            search = solving.search(at, mobility, posed)
+            return at, solving.solve(search, what, deadline), closing
 
-        By sweeps alone where no solver is asked for, and no time is counted or over.
-        """
-        mu = self.system.mu
-        posed = self._unsqueezed(rows, mobility, posed, nc, deadline)
-        if self.solver is None and not _timed(deadline):
-            search = Search(posed, rows, mobility, nc, mu, self.asked.tolerance)
-            found, start = found_quickly(search)
-            if found is not None:
-                return found
-            posed = posed._replace(start=start)
-        law = law_of(nc, len(posed.q) - nc, mu)
-        return self._driven(posed.problem(law), posed.start, what, deadline)
+        def again(at: Met, posed: Posed) -> Solved | None:
+            return solving.tried(solving.search(at, mobility, posed), deadline, solvers=False)
 
-    def _unsqueezed(
-        self, rows: Rows, mobility: Mobility, posed: Posed, nc: int, deadline: Deadline
-    ) -> Posed:
-        """Started without squeeze between planes; as it is where work is counted or over."""
-        mu = self.system.mu
-        if mu == 0 or _timed(deadline):
-            return posed
-        if self.guides is None or not self.guides.hold(rows, nc, len(mobility[0])):
-            return posed
-        return least_squeezed(rows, mobility, posed, nc, mu, self.asked.tolerance)
+        return closed_beside(self.joints, half, at, solved, search.goal, again)
 
-    def _rolled(  # noqa: PLR0913
-        self, at: Met, mobility: Mobility, posed: Posed, omega: Array, state: RigidState,
-        what: str, deadline: Deadline,
-    ) -> FrictionSolution:  # fmt: skip
+    def _rolled(
+        self, at: Met, half: Halfway, what: str, deadline: Deadline
+    ) -> FrictionSolution:
         """Impulses and moments, (nc, 6), where contacts resist rolling or spinning."""
-        problem = rolling_problem(self.system, at.rows, mobility, posed, omega)
+        state = half.state
+        posed = self.solving.unsqueezed(at, half.mobility, half.posed(at), deadline)
+        omega = to_global(*half.middle[2:])
+        problem = rolling_problem(self.system, at.rows, half.mobility, posed, omega)
         moments = np.zeros((len(at.keys), 3))
         if len(state.moments):
             matched(at.keys, state.keys, state.moments, moments)
-        return self._driven(problem, np.hstack([posed.start, moments]), what, deadline)
-
-    def _driven(
-        self, problem: Problem, start: Array, what: str, deadline: Deadline,
-        enough: float = 0.0,
-    ) -> FrictionSolution:  # fmt: skip
-        """What the solvers find from a start (n, d); raises NotConverged where asked to.
-
-        enough: an error that does where the tolerance is not reached.
-        """
-        asked = self.asked
-        asked = asked if deadline is NEVER else replace(asked, time_limit=deadline)
-        solution = drive_as_asked(problem, asked, Iterate(start), self.solver)
-        record = solution.convergence
-        missed = not solution.converged and (record.by_user or record.error > enough)
-        if self.check and missed:
-            kind = Interrupted if record.by_user else NotConverged
-            raise kind(f"{what}: {record}. {record.advice}", solution)
-        return solution
+        start = np.hstack([posed.start, moments])
+        return self.solving.judged(self.solving.driven(problem, start, deadline), what)
 
     def _mended(
         self, at: Met, R: Array, what: str, deadline: Deadline
@@ -383,15 +349,9 @@ class _Stepping:
         q[nc:] = at.apart
         inverse = global_inverse(R, self.inverse)
         posed = Posed(*delassus(rows, masses, inverse), q, np.zeros_like(q))
-        found = None
-        if self.solver is None:
-            search = Search(posed, rows, (masses, inverse), nc, 0.0, self.asked.tolerance)
-            found, start = found_quickly(search)
-            posed = posed._replace(start=start)
-        if found is None:
-            problem = posed.problem(law_of(nc, len(q) - nc, 0.0))
-            what = f"{what}, overlaps to be mended"
-            found = self._driven(problem, posed.start, what, deadline, MENDED)
+        search = self.solving.search(at, (masses, inverse), posed, mu=0.0)
+        what = f"{what}, overlaps to be mended"
+        found = self.solving.solve(search, what, deadline, MENDED)
         push, turn = impulses(rows, found.r, len(masses))
         moved = push / masses[:, None], np.einsum("bij,bj->bi", inverse, turn)
         gaps[loose] = found.u[:nc, 0] - 0.5 * self.overlap

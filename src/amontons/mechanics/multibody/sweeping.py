@@ -21,12 +21,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...core.clock import now
+from ...problem.friction import FrictionProblem
 from ...problem.judge.measures import natural_error
 from ...problem.law.law import COULOMB, TIED
 from ...solvers.judging import BLUR
 from ...solvers.newton.body_relaxation import BodyMatrix, body_matrix, relaxed
 from ...solvers.sweeps.on_bodies import driven_inplace, felt_inplace
-from .quick import Found, Posed, eliminated_of, solved
+from .quick import Found, Posed, eliminated_of, law_of, solved
 from .rows import Mobility, Rows, levers_of
 
 Array = NDArray[np.float64]
@@ -37,9 +38,10 @@ LONGEST = 1000  # after relaxations that have not helped
 STEPS = 60  # of a relaxation at most
 ROUNDS = 30  # relaxations before the solvers are asked
 PATIENCE = 5  # of them without halving the error
-# Nanoseconds, only ratios count: of a sweep per contact; of a step of a relaxation per contact
-# and per product of blocks; of a relaxation at most, beyond which packings in space fill in.
-SWEEP, STEP, PRODUCT, MOST = 120.0, 900.0, 12.0, 4e9
+# Nanoseconds, only ratios count: of a plain sweep per block of W; of a sweep with momentum per
+# contact; of a step of a relaxation per contact and per product of blocks; of a relaxation at
+# most, beyond which packings in space fill in.
+BLOCK, SWEEP, STEP, PRODUCT, MOST = 30.0, 120.0, 900.0, 12.0, 4e9
 USUAL = 40  # steps of a relaxation
 NO_LEVERS, NO_SIDES = np.zeros((0, 2, 3, 6)), np.zeros((0, 2), np.int64)
 
@@ -98,6 +100,12 @@ class Search:
     def relaxation_cost(self) -> float:
         """Nanoseconds of a usual relaxation."""
         return USUAL * (STEP * len(self.posed.q) + PRODUCT * self.matrix.products)
+
+    @property
+    def problem(self) -> FrictionProblem:
+        """The same for the solvers, who cannot write to it."""
+        n = len(self.posed.q)
+        return self.posed.problem(law_of(self.contacts, n - self.contacts, self.mu))
 
     # ------------------------------------------------------------------ what it does
     def sweep(self, start: Array, plain: int, momentum: int) -> Found | None:
@@ -162,8 +170,11 @@ class Search:
 
 def found_quickly(search: Search) -> tuple[Found | None, Array]:
     """What is found, None where the tolerance is not met; and the best impulses (n, 3)."""
-    plain = WORK // max(len(search.posed.indices), 1)
+    blocks = max(len(search.posed.indices), 1)
+    plain = WORK // blocks
     if plain >= FEWEST:
+        worth = int(USUAL * STEP * len(search.posed.q) / (BLOCK * blocks))
+        plain = min(plain, max(FEWEST, worth))  # what a relaxation costs at least
         found = search.sweep(search.r, plain, 0)
         if found is not None:
             return found, found.r
