@@ -107,7 +107,8 @@ class FacetPairs:
 
     def integrals(self) -> tuple[Array, Array]:
         """mass (k, a, a + e) and cross (k, a, b + h)."""
-        return self._times(self._visible * self.opposed)
+        mass, cross = self._seen
+        return _over(self.opposed, mass) * mass, _over(self.opposed, cross) * cross
 
     def slopes(self) -> tuple[Array, Array]:
         """Their derivatives by all corners, (k, a, a + e, (a + b) d) and (k, a, b + h, ...)."""
@@ -130,13 +131,19 @@ class FacetPairs:
         return out
 
     @cached_property
+    def _seen(self) -> tuple[Array, Array]:
+        """Integrals over what the slave's facet sees, times w alone."""
+        return self._times(self._visible)
+
+    @cached_property
     def _turned(self) -> Index:
-        """Pairs of which o may be below 1."""
-        return np.flatnonzero(cosine(self.slave, self.master) < WHOLE)
+        """Pairs that share something, of which o may be below 1."""
+        some = np.flatnonzero(cosine(self.slave, self.master) < WHOLE)
+        return some[self._seen[0][some].any(axis=(1, 2))] if len(some) else some
 
     @cached_property
     def opposed(self) -> Array:
-        """o of `opposed`, (k,)."""
+        """o of `opposed`, (k,); 1 of what shares nothing."""
         out, some = np.ones(len(self.facing)), self.part(self._turned)
         if len(self._turned):
             back = some._other_way
