@@ -157,16 +157,17 @@ def by_approach(q):
 def visit_inplace(s, first, last, backward, r):
     """Visit contacts, the first to the last - 1 in the order; returns their change squared."""
     nc, full, flat, change = len(s.order), s.rows.shape[2] > 3, r.reshape(r.size), 0.0
+    W = s.data  # views of a block would count references in the loop
     for step in range(first, last):
         i = uint64(s.order[nc - 1 - step if backward else step])
         b0, b1, b2 = s.q[i, 0], s.q[i, 1], s.q[i, 2]
         mu, r0, r1, r2 = s.parameters[i, MU], r[i, 0], r[i, 1], r[i, 2]
-        A, e = s.data[uint64(s.diagonal[i])], s.eliminated[i]
+        own = uint64(s.diagonal[i])
         if full:
             u0, u1, u2 = full_product(s.rows, i, flat)
-            b0 += u0 - (A[0, 0] * r0 + A[0, 1] * r1 + A[0, 2] * r2)
-            b1 += u1 - (A[1, 0] * r0 + A[1, 1] * r1 + A[1, 2] * r2)
-            b2 += u2 - (A[2, 0] * r0 + A[2, 1] * r1 + A[2, 2] * r2)
+            b0 += u0 - (W[own, 0, 0] * r0 + W[own, 0, 1] * r1 + W[own, 0, 2] * r2)
+            b1 += u1 - (W[own, 1, 0] * r0 + W[own, 1, 1] * r1 + W[own, 1, 2] * r2)
+            b2 += u2 - (W[own, 2, 0] * r0 + W[own, 2, 1] * r1 + W[own, 2, 2] * r2)
         else:
             for k in range(uint64(s.indptr[i]), uint64(s.indptr[i + uint64(1)])):
                 j = uint64(s.indices[k])  # unsigned: no test for negative indices in the loop
@@ -178,27 +179,29 @@ def visit_inplace(s, first, last, backward, r):
                 b2 += s.data[k, 2, 0] * x0 + s.data[k, 2, 1] * x1 + s.data[k, 2, 2] * x2
         if s.local == EXACT:
             if s.kind[i] == COULOMB:
-                x0, x1, x2 = solve_eliminated(e, A, b0, b1, b2, mu, r1, r2)
+                x0, x1, x2 = solve_eliminated(
+                    s.eliminated, s.data, i, own, b0, b1, b2, mu, r1, r2
+                )
             else:
                 x0, x1, x2, _ = solve_contact(
-                    A, b0, b1, b2, s.kind[i], s.parameters[i], r1, r2
+                    s.data[own], b0, b1, b2, s.kind[i], s.parameters[i], r1, r2
                 )
         elif s.local == NEWTON:
             x0, x1, x2 = newton_contact(
-                A, b0, b1, b2, mu, r0, r1, r2, s.close, s.steps, s.work
+                s.data[own], b0, b1, b2, mu, r0, r1, r2, s.close, s.steps, s.work
             )
         else:
             x0, x1, x2 = projection_contact(
-                A, b0, b1, b2, mu, r0, r1, r2, s.close, s.steps, s.work
+                s.data[own], b0, b1, b2, mu, r0, r1, r2, s.close, s.steps, s.work
             )
         d0, d1, d2 = x0 - r0, x1 - r1, x2 - r2
         w = s.relaxation if x0 > 0.0 else 1.0  # open at once: else r fades into denormals
         r[i, 0], r[i, 1], r[i, 2] = r0 + w * d0, r1 + w * d1, r2 + w * d2
-        change += e[16] * (d0 * d0 + d1 * d1 + d2 * d2)
+        change += s.eliminated[i, 16] * (d0 * d0 + d1 * d1 + d2 * d2)
     return change
 
 
-@njit(cache=True, error_model="numpy")
+@njit(cache=True, error_model="numpy", inline="always")
 def sweep_inplace(s, backward, r):
     """One sweep over all contacts on r (nc, 3); returns the change."""
     nc, change = len(s.order), 0.0
@@ -207,7 +210,7 @@ def sweep_inplace(s, backward, r):
     return math.sqrt(change)
 
 
-@njit(cache=True, error_model="numpy")
+@njit(cache=True, error_model="numpy", inline="always")
 def content(s, r, change, watch):
     """True when the error is at most watch[0]; see `watch_for`."""
     if not change <= watch[1]:

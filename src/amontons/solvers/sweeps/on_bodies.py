@@ -73,7 +73,9 @@ def sweep_bodies_inplace(s, levers, sides, r, w):
         b1 -= A[1, 0] * r0 + A[1, 1] * r1 + A[1, 2] * r2
         b2 -= A[2, 0] * r0 + A[2, 1] * r1 + A[2, 2] * r2
         if s.kind[i] == COULOMB:
-            x0, x1, x2 = solve_eliminated(e, A, b0, b1, b2, s.parameters[i, MU], r1, r2)
+            x0, x1, x2 = solve_eliminated(
+                s.eliminated, s.data, i, s.diagonal[i], b0, b1, b2, s.parameters[i, MU], r1, r2
+            )
         else:
             x0, x1, x2, _ = solve_contact(A, b0, b1, b2, s.kind[i], s.parameters[i], r1, r2)
         d0, d1, d2 = x0 - r0, x1 - r1, x2 - r2
