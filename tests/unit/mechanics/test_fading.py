@@ -4,7 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from tangent_checker import checked_tangents
+from tangent_checker import FOURTH, checked_tangents
 
 import amontons as am
 from amontons.mechanics.contact.fading import FULL
@@ -144,6 +144,45 @@ def test_the_tangent_of_what_fades_is_exact(dim, more):
         motion = problem.contact_point(draws[0][0]).motion
         play = np.linalg.norm(motion, axis=1) * rng.uniform(0, 1, problem.contacts)
         assert checked_tangents(replace(problem, play=play), draws) >= 2
+
+
+def beside_a_support(width, gap=0.1):
+    """The right end of the upper body is held; only there a sliver of it faces the lower."""
+    upper = am.Body(am.box((1, 1), (3, 2)), NEO, name="upper")
+    lower = am.Body(am.box((1, 1), (3, 2), origin=(1 - width, -1 - gap)), NEO, name="lower")
+    return am.Model([upper, lower], [am.Fix("upper.right", 0), am.Fix("lower.bottom", 0)],
+                    [am.Contact("upper.bottom", master="lower.top", mu=0)],
+                    [am.Traction("upper.top", (0.1, -0.02))])  # fmt: skip
+
+
+@pytest.mark.parametrize("width", [1e-3, 1e-6])
+def test_slivers_beside_a_support_leave_the_residual_exact(width):
+    """Who is alone there compares with nobody, and its averages are of the size 2 / width."""
+    model, rng = beside_a_support(width), np.random.default_rng(3)
+    parts = large_deformation(model).parts
+    u = 0.01 * rng.standard_normal(parts.X.shape)
+    fixed = np.ones(u.size, dtype=bool)
+    fixed[parts.free] = False
+    u[parts.X[:, 0] > 0.99] = 0
+    u[2, 1] = 0  # of the slave alone
+    problem = large_step(model, np.zeros(u.size), np.zeros(u.size), u.ravel())
+    v = u.ravel()[parts.free]
+    meeting = problem.contact_point(v).meeting.parts[0]
+    assert meeting.met.sum() == 1
+    assert np.abs(meeting.averages.data).max() > 0.1 / width
+    near = [problem.residual(v + 1e-15 * rng.standard_normal(len(v))) for _ in range(4)]
+    assert np.ptp(near, axis=0).max() < 1e-11 * np.abs(near).max()
+    if width > 1e-6:
+        draws = 0.1 * rng.standard_normal((2, len(v)))
+        assert checked_tangents(problem, [(v, one) for one in draws], FOURTH) == 2
+
+
+def test_what_touches_nobody_is_solved_as_without_contact():
+    """Also where the only slave that faces the master does so by a sliver: 8 and 4 steps."""
+    model = beside_a_support(0.05, gap=1.0)
+    with_contact, without = (am.solve(one, tolerance=1e-10).convergence.iterations
+                             for one in (model, replace(model, contacts=[])))  # fmt: skip
+    assert with_contact <= without + 1
 
 
 def sliver(width):

@@ -373,11 +373,11 @@ class MortarMeeting:
 
     @cached_property
     def fading(self) -> Fading | None:
-        """What mixes the law of nodes that hardly anything faces; None for none."""
+        """What fades of nodes that hardly anything faces; None for none."""
         if self.pair.areas is None or not len(self.slaves):
             return None
         found = Fading(self, self.pair.areas)
-        return found if found.faint.any() else None
+        return found if found.hardly.any() else None
 
     @cached_property
     def couples(self) -> Couples:

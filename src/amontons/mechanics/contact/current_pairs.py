@@ -249,15 +249,16 @@ class Meetings:
         if not any(parts):
             return None
         weights, passed, start = np.ones(len(force)), np.zeros(force.shape), 0
+        theta = weights.copy()
         for part, fading in zip(self.parts, parts, strict=True):
             mine = slice(start, start + len(part.slaves))
             start = mine.stop
             if fading is not None:
-                weights[mine] = fading.weights
+                weights[mine], theta[mine] = fading.weights, fading.theta
                 passed[mine] = fading.shares @ force[mine]
         if drawn is not None:
             drawn = np.einsum("pk,pkc->pc", drawn, self.frames[:, 1:]) * contact.free
-        return Mixture(weights, passed, contact.rho, contact.give, contact.law.offset,
+        return Mixture(weights, theta, passed, contact.rho, contact.give, contact.law.offset,
                        contact.free, force, motion, self.gap, self.normals, drawn)  # fmt: skip
 
     @cached_property

@@ -27,6 +27,12 @@ tells, so that statuses and errors are those of the law.  What slid while open, 
 taken off z_T as (2) has it: for w = 0 off the mean force.  A bound that is a given stress says
 itself how much a node bears of what faces it: Tresca's law does not fade.
 
+Whose neighbours have no row, or a sliver as well, compares with nobody: kappa is infinite, or
+1, and w is 1.  That its averages are extrapolations from a sliver the covered part itself says,
+and how far its force is believed away from a solution, (3) of `model.moved_pairs`:
+
+    theta_s = w_s S(c_s / FULL),    S(t) = t^2 (3 - 2 t) for t < 1, else 1.                 (4)
+
 Where the master ends with a facet kappa_s is 1/2, at a corner of quadrilaterals 5/12, and 1/3
 where the facet beyond is twice as long, or at a corner with one of six triangles: such nodes
 bear whole, and FULL is less.  With a facet beyond k times as long kappa_s is 1 / (1 + k): a
@@ -51,6 +57,7 @@ from numpy.typing import NDArray
 from scipy import sparse
 
 from ...linear.sums import Blocks, sum_of_blocks, sum_of_products
+from .current_slopes import blocks_of
 
 if TYPE_CHECKING:
     from .current import Partials
@@ -118,8 +125,36 @@ class Fading:
     @cached_property
     def weights(self) -> Array:
         """w, (nc,)."""
-        t = np.where(self.faint, self._kappa / FULL, 1.0)
-        return t * t * (3 - 2 * t)
+        return _smooth(np.where(self.faint, self._kappa / FULL, 1.0))
+
+    @cached_property
+    def hardly(self) -> Mask:
+        """Whose theta of (4) is less than 1, (nc,)."""
+        return self.at.met & ((self._covered < FULL) | self.faint)
+
+    @cached_property
+    def _believed(self) -> tuple[Array, Array]:
+        """S of (4) and its derivative by c, (nc,) each; 1 and 0 of who meets nobody."""
+        t = np.where(self.at.met, np.minimum(self._covered / FULL, 1.0), 1.0)
+        return _smooth(t), 6 * t * (1 - t) / FULL
+
+    @property
+    def theta(self) -> Array:
+        """(4), (nc,)."""
+        return self.weights * self._believed[0]
+
+    def theta_slopes(self, factors: Array) -> sparse.csr_array:
+        """Derivative by x of factors_s theta_s, (nc m, nodes d); factors (nc, m), held."""
+        nc, m = factors.shape
+        whole, steep = self._believed
+        by_D = factors * (self.weights * steep / self.areas)[:, None]
+        spread = blocks_of(by_D[:, :, None])
+        out = sparse.csr_array(spread @ self.at.slopes.weights.matrix)
+        if not self.faint.any():
+            return out
+        d = self.at.x.shape[1]
+        nothing = np.zeros((nc, d)), np.zeros((nc, m, d))
+        return sparse.csr_array(out + self.slopes(*nothing, factors * whole[:, None]))
 
     @cached_property
     def _factor(self) -> Array:
@@ -150,6 +185,8 @@ class Fading:
         force (nc, d): lambda, held; by_share (nc, m, d), by_weight (nc, m).
         """
         rows, (nc, m), n = self.at.rows, by_weight.shape, self.at.x.size
+        if not self.faint.any():
+            return sparse.csr_array((nc * m, n))
         a, whole = (np.where(self.faint, part, 1.0) for part in self._sums)
         kappa = np.where(self.faint, self._kappa, 0.0)
         steep = 6 * kappa / FULL * (1 - kappa / FULL) * kappa / FULL  # kappa dw/dkappa
@@ -196,6 +233,11 @@ class Fading:
                 _rows_of_each(rows[of[pairs]], m), dofs[pairs])  # fmt: skip
 
 
+def _smooth(t: Array) -> Array:
+    """t^2 (3 - 2 t)."""
+    return t * t * (3 - 2 * t)
+
+
 def _rows_of_each(rows: NDArray[np.int64], m: int) -> NDArray[np.int64]:
     """The m rows of each contact in rows (f, a), -1 for none; (f, a m)."""
     each = np.where(rows[:, :, None] >= 0, rows[:, :, None] * m + np.arange(m), -1)
@@ -206,11 +248,12 @@ def _rows_of_each(rows: NDArray[np.int64], m: int) -> NDArray[np.int64]:
 class Mixture:
     """(3) of all contacts at forces lambda and motions s (nc, d), gaps (nc,), normals (nc, d).
 
-    weights w (nc,); passed D p (nc, d); rho (nc,); give C and C_T (nc, 2); offset o (nc,);
-    free (nc, d); drawn q (nc, d), without what supports hold, None for zero.
+    weights w and theta of (4) (nc,); passed D p (nc, d); rho (nc,); give C and C_T (nc, 2);
+    offset o (nc,); free (nc, d); drawn q (nc, d), without what supports hold, None for zero.
     """
 
     weights: Array
+    theta: Array
     passed: Array
     rho: Array
     give: Array

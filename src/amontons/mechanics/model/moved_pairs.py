@@ -20,13 +20,13 @@ nilpotent: (I + C O)^-1 = I - C O + (C O)^2 - ..., with as many terms as the cha
 Nodes of which hardly anything faces the master, `contact.fading`, have averages B that are
 extrapolations from a sliver of width d: these change by 1 / d and are told to eps / d^2 only.
 What the law gives such a node is next to nothing, but lambda, which its body asks for, may be
-anything away from a solution.  With the weight w_p of (2) there and law_p, (2) of
-`contact.current`, other nodes get
+anything away from a solution.  With theta_p of (4) there and law_p, (2) of `contact.current`,
+other nodes get
 
-    lambda_p - (1 - w_p) law_p                                                              (3)
+    lambda_p - (1 - theta_p) law_p                                                          (3)
 
-in the place of lambda_p in (1): the same where F = 0, and else, as w goes to zero, the force of
-the law itself, which does so, too, with the part that faces the master.
+in the place of lambda_p in (1): the same where F = 0, and else, as theta goes to zero, the
+force of the law itself: none of nodes that are open, and next to nothing where w goes to zero.
 """
 
 from __future__ import annotations
@@ -107,10 +107,10 @@ def balanced_law(
 
 
 def kept_back(point: ContactPoint, pieces: Pieces | None = None) -> Array | None:
-    """(1 - w) law of (3), (nc, d), of the active or given pieces; None where nothing fades."""
+    """(1 - theta) law of (3), (nc, d), of active or given pieces; None where nothing fades."""
     if point.mixed is None:
         return None
-    faint = 1 - point.mixed.weights
+    faint = 1 - point.mixed.theta
     return faint[:, None] * point.residual(pieces) * point.contact.free
 
 
@@ -179,9 +179,9 @@ class PairLinearisation:
 
     @cached_property
     def _faint(self) -> Array:
-        """1 - w of (3), zero for components that supports take, (nc d,)."""
+        """1 - theta of (3), zero for components that supports take, (nc d,)."""
         assert self.point.mixed is not None
-        return np.ravel((1 - self.point.mixed.weights)[:, None] * self.parts.contact.free)
+        return np.ravel((1 - self.point.mixed.theta)[:, None] * self.parts.contact.free)
 
     @cached_property
     def _by_force(self) -> sparse.csr_array:
@@ -299,8 +299,7 @@ class PairLinearisation:
             if fading is None:
                 rows.append(sparse.csr_array((law[mine].size, len(self.rest))))
             else:
-                nothing = np.zeros((*law[mine].shape, law.shape[1]))
-                rows.append(fading.slopes(force[mine], nothing, law[mine]))
+                rows.append(fading.theta_slopes(law[mine]))
         kept = sparse.csr_array(sparse.diags_array(self._faint) @ self._by_place)
         yield [(self._others, sparse.csr_array(kept - sparse.csr_array(sparse.vstack(rows))))]
 
