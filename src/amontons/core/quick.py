@@ -13,5 +13,5 @@ def made(kind: type[T], /, **fields: Any) -> T:
     Neither `__init__` nor `__post_init__` runs: a frozen one sets each field by a call.
     """
     out = object.__new__(kind)
-    out.__dict__.update(fields)
+    object.__setattr__(out, "__dict__", fields)
     return out

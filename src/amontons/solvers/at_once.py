@@ -127,7 +127,8 @@ def told(
     if problem is not mine:
         of, u, v = problem.recover(r)
         return FrictionSolution(of, r, u, v, record, settled=settled)
-    r.flags.writeable = u.flags.writeable = False
+    r.setflags(write=False)
+    u.setflags(write=False)
     return made(
         FrictionSolution, problem=mine, r=r, u=u, v=None, convergence=record, settled=settled
     )

@@ -205,11 +205,15 @@ def solve_range(first, last, sizes, table, data, floor, r, u, states, memory):  
 
 
 class Read(NamedTuple):
-    """What `solve_range` reads of a problem; sizes (2, 3)."""
+    """What `solve_range` reads of a problem; sizes (2, 3).
+
+    flops: operations of an accelerated sweep, without those on single contacts.
+    """
 
     sizes: Counts
     data: tuple[Any, ...]
     floor: Array
+    flops: float
 
 
 def read_of(problem: FrictionProblem) -> Read:
@@ -218,8 +222,10 @@ def read_of(problem: FrictionProblem) -> Read:
     full = blocks.rows.reshape(-1) if blocks.rows is not blocks.data else NO_NUMBERS
     order = read_only(visits(data[3], len(blocks.indices)))
     arrays = *data[:3], full, *data[3:], blocks.diagonal, blocks.eliminated, order
-    sizes = np.array([(0, 0, 0), (problem.contacts, len(blocks.indices), full.size)], np.int64)
-    return Read(sizes, arrays, read_only(np.array(problem.floor)))
+    contacts, count = problem.contacts, len(blocks.indices)
+    sizes = np.array([(0, 0, 0), (contacts, count, full.size)], np.int64)
+    flops = flops_of_sweep(count, contacts) + flops_of_acceleration(3 * contacts, DEPTH)
+    return Read(sizes, arrays, read_only(np.array(problem.floor)), flops)
 
 
 def _joined(arrays: Sequence[NDArray]) -> NDArray:
@@ -249,9 +255,9 @@ class Together:
     weakest: float = math.inf  # error of a contact from which those that are light go on
 
     def __post_init__(self) -> None:
-        reads = [problem.kept_alone(read_of) for problem in self.problems]
+        self.reads = reads = [problem.kept_alone(read_of) for problem in self.problems]
         if len(reads) == 1:
-            self.sizes, self.data, self.floor = reads[0]
+            self.sizes, self.data, self.floor, _ = reads[0]
         else:
             ends = np.cumsum([read.sizes[1] for read in reads], axis=0)
             self.sizes = np.concatenate([reads[0].sizes[:1], ends])
@@ -309,6 +315,4 @@ class Together:
 
     def flops(self, p: int) -> float:
         """Floating point operations of the sweeps on a problem, once they are done."""
-        contacts, blocks = self.problems[p].contacts, len(self.problems[p].blocks.indices)
-        each = flops_of_sweep(blocks, contacts) + flops_of_acceleration(3 * contacts, DEPTH)
-        return float(self.table[p, SWEEPS]) * each + float(self.table[p, WORK])
+        return float(self.table[p, SWEEPS]) * self.reads[p].flops + float(self.table[p, WORK])
