@@ -10,6 +10,7 @@ import amontons as am
 from amontons.mechanics.multibody import GROUND, Joint, RigidBodies, RigidBody, cuboid
 from amontons.mechanics.multibody.guides import Guides
 from amontons.mechanics.multibody.joints import Joints
+from amontons.mechanics.multibody.moving import at_start
 from amontons.mechanics.multibody.rows import Rows
 
 FLOOR = am.Plane((0, 0, 1))
@@ -359,3 +360,21 @@ def test_perpendicular_walls_do_not_face_each_other():
 
     assert not faces(turned)
     assert faces(np.array([turned[0], -turned[0]]))
+
+
+@pytest.mark.parametrize("tilt", [1e-8, 1e-6])
+def test_two_joints_on_a_line_do_not_weld_where_they_are_not_quite_on_it(tilt):
+    """A wheel that turns on a stand moves as it does with joints in line to the last digit."""
+    stand = RigidBody(cuboid((0.2, 0.2, 0.2)), 1000, (0, 0, 0.1))
+    wheel = RigidBody(cuboid((0.1, 0.3, 0.1)), 1000, (0.3, 0, 0.1), spin=(30.0, 0, 0))
+    pins = [Joint(1, 0, (x, 0, 0.1)) for x in (0.1, 0.3)]
+    system = RigidBodies([stand, wheel], [FLOOR], mu=0.5, joints=pins)
+    start = at_start(system)
+    turned = start.motion.orientation.copy()
+    turned[1] = 1, 0, 0.5 * tilt, 0
+    begins = start, replace(start, motion=start.motion._replace(orientation=turned))
+    straight, off = (
+        run(system, 1e-3, 0.05, start=begin)[-1] for begin in begins
+    )
+    np.testing.assert_allclose(off.state.motion.spin, straight.state.motion.spin, atol=1e-5)
+    np.testing.assert_allclose(off.joints, straight.joints, atol=1e-6)

@@ -46,6 +46,7 @@ from .bonds import (
     kept_to,
     left_of,
     pulled_by,
+    solved_bonds,
 )
 from .rows import Rows, delassus, levers_of, rotations
 from .states import Motion
@@ -129,6 +130,13 @@ class Joints:
         """W_JJ and its factor for bodies turned by R, and their inverse inertia there."""
         inverse = global_inverse(R, self.bodies[2])
         return factorised(tuple(rows), self.pattern, self.bodies[0], inverse), inverse
+
+    def contradicted(self, rows: Rows, inverse: Array, b: Array) -> Array:
+        """What of b (k, 3) no impulses of joints with these rows give."""
+        factor = factorised(tuple(rows), self.pattern, self.bodies[0], inverse)
+        indptr, indices, *_ = self.pattern
+        W = sparse.bsr_array((factor[0], indices, indptr), (b.size, b.size))
+        return b - (W @ solved_bonds(self.pattern, factor, b).ravel()).reshape(b.shape)
 
     def kept(self, motion: Motion) -> tuple[Motion, Array, Array, tuple[float, float]]:
         """A motion that keeps to the joints, impulses, sides apart (k, 3), energy and work."""

@@ -45,15 +45,21 @@ class Halfway:
             at.keys, last,
         ))  # fmt: skip
 
-    def still(self, at: Met) -> tuple[Posed, Array]:
+    def still(self, joints: Joints, at: Met) -> tuple[Posed, Array]:
         """The problem of joints that keep still, u1 = 0, and what c (k, 3) that is."""
-        rows: list[Any] = [part[len(at.keys):] for part in at.rows]
+        nc, posed = len(at.keys), self.posed(at)
         omega = to_global(self.middle[2], self.middle[3])
-        return self.posed(at), velocities(Rows(*rows), self.before.velocity, omega)
+        left = joints.contradicted(joints_of(at), self.mobility[1], posed.q[nc:])
+        posed.q[nc:] -= left
+        return posed, velocities(joints_of(at), self.before.velocity, omega) + left
 
-    def mirrored(self, at: Met, c: Array, meet: bool = False) -> Posed:
-        """The same of joints that take back what has parted, u1 = c - u_m, see `moving`.
+    def mirrored(
+        self, joints: Joints, at: Met, c: Array, meet: bool = False
+    ) -> tuple[Posed, Array]:
+        """The same of joints that take back what has parted, u1 = c - u_m, and that c.
 
+        What joints that say something twice contradict, as their sides are never closed to
+        the last digit, is left out of q: reactions would grow without end for it.
         Contacts that hang on joints take part in that, u1_N >= min(X^T u1, 0); where sides are
         to meet at the end by no more than what has lifted them, X^T c - min(X^T u_m, u_m).
         """
@@ -66,7 +72,9 @@ class Halfway:
             if meet:
                 back = np.minimum(back, np.maximum(u_m[:nc, 0], 0.0))
             posed.q[:nc, 0] -= np.minimum(at.hung.pulled(c, len(v)) - back, 0.0)
-        return posed
+        left = joints.contradicted(joints_of(at), self.mobility[1], posed.q[nc:])
+        posed.q[nc:] -= left
+        return posed, c + left
 
     def closed(self, joints: Joints, at: Met) -> tuple[Met, Posed, Array]:
         """The problem where joints close at the end, and c (k, 3).
@@ -76,12 +84,12 @@ class Halfway:
         """
         if at.hung is not None:
             c = np.zeros_like(at.apart)
-            return at, self.mirrored(at, c), c
+            return at, *self.mirrored(joints, at, c)
         rows, pull, c = joints.closed(
             self.before.orientation, self.middle, self.before.velocity, self.h, self.gravity
         )
         at = _with_joints(at, rows)
-        posed = self.mirrored(at, c)
+        posed, c = self.mirrored(joints, at, c)
         if not len(at.keys):  # beside contacts it would leave none of the load to them
             posed.start[:] = pull
         return at, posed, c
@@ -125,13 +133,19 @@ def closed_beside(  # noqa: PLR0913
             for old, new in zip(theirs, rows, strict=True)
         ]
         now, c = _with_joints(at, Rows(*chosen)), np.where(failed[:, None], 0.0, aim)
-        posed = half.mirrored(now, c, meet=True)
+        posed, c = half.mirrored(joints, now, c, meet=True)
         posed.start[:] = solved.r
         again = solve(now, posed)
         if again is None:
             return first
         solved = again
     return now, solved, c
+
+
+def joints_of(at: Met) -> Rows:
+    """Rows of the joints alone."""
+    rows: list[Any] = [np.ascontiguousarray(part[len(at.keys) :]) for part in at.rows]
+    return Rows(*rows)
 
 
 def _with_joints(at: Met, joints: Rows) -> Met:

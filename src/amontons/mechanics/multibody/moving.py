@@ -72,7 +72,7 @@ from .guides import Guides
 from .joints import Joints
 from .meeting import meetings
 from .met import Met
-from .mirrored import Halfway, closed_beside
+from .mirrored import Halfway, closed_beside, joints_of
 from .quick import Found, Posed, matched
 from .rolling import couples, rolling_problem
 from .rows import (
@@ -309,7 +309,7 @@ class _Stepping:
             return at, solving.solve(search, what, deadline), closing
         solved = solving.tried(search, deadline, solvers=True)
         if solved is None:  # friction that jams a contact lets joints take nothing back
-            posed, closing = half.still(at)
+            posed, closing = half.still(self.joints, at)
             search = solving.search(at, mobility, posed)
             return at, solving.solve(search, what, deadline), closing
 
@@ -348,6 +348,8 @@ class _Stepping:
         q[:nc, 0] = at.found.gaps + 0.5 * self.overlap
         q[nc:] = at.apart
         inverse = global_inverse(R, self.inverse)
+        if self.joints is not None:  # what joints that say something twice contradict stays
+            q[nc:] -= self.joints.contradicted(joints_of(at), inverse, q[nc:])
         posed = Posed(*delassus(rows, masses, inverse), q, np.zeros_like(q))
         search = self.solving.search(at, (masses, inverse), posed, mu=0.0)
         what = f"{what}, overlaps to be mended"
