@@ -1,5 +1,7 @@
 """Masters of several bodies, and nodes that are slave of one contact and master of another."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from tangent_checker import checked_tangents
@@ -123,6 +125,22 @@ def test_what_overlapping_masters_cover_counts_once_wherever_they_are(dim):
 ])  # fmt: skip
 def test_tangents_over_overlapping_masters_are_exact(dim, kind, order):
     check(overlapping(dim, 0.02, kind, order), 0.005, 3)
+
+
+@pytest.mark.parametrize("dim", [2, 3])
+def test_tangents_are_exact_where_what_is_cut_is_hardly_opposite_too(dim):
+    """The block's underside is a roof whose sides lean by some 50 degrees."""
+    model = overlapping(dim, 0.02)
+    left, right, upper = model.bodies
+    points = upper.mesh.points.copy()
+    points[:, -1] += 1.2 * np.abs(points[:, 0] - 0.75)
+    upper = am.Body(replace(upper.mesh, points=points), NEO, name="upper")
+    model = am.Model([left, right, upper], model.supports, model.contacts)
+    parts = large_deformation(model).parts
+    shared = parts.meet(np.zeros(parts.X.shape)).parts[0].shared
+    assert shared.cut is not None
+    assert (shared.opposed[: len(shared.cut.share)][shared.cut.share < 1] < 1).any()
+    check(model, 0.005, 3)
 
 
 def check(model, size, least):
