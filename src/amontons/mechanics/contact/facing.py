@@ -200,10 +200,11 @@ class Skin:
         return out
 
     def size_slopes(self, x: Array, chosen: Index) -> Array:
-        """Derivatives of the areas of chosen facets (k,) by their nodes, (k, a d)."""
+        """Derivatives of areas of chosen facets (k,) by their nodes, (k, a d); 0 of points."""
         some = self.part(chosen)
         areas = some.areas(x)
-        n = areas / np.linalg.norm(areas, axis=1)[:, None]
+        size = np.linalg.norm(areas, axis=1)[:, None]
+        n = areas / np.where(size > 0, size, 1.0)
         slopes = np.einsum("kd,kdac->kac", n, some.area_slopes(x))
         return slopes.reshape(len(areas), slopes.shape[1] * slopes.shape[2])
 

@@ -62,11 +62,8 @@ class GrownAreas:
 
     def slopes(self, x: Array) -> sparse.csr_array:
         """da/dx, (nc, n d)."""
-        areas, nodes = self.skin.areas(x), self.skin.nodes
-        size = np.linalg.norm(areas, axis=1)[:, None]
-        unit = areas / np.where(size > 0, size, 1.0)
-        values = np.einsum("fd,fdae->fae", unit, self.skin.area_slopes(x)).ravel()
-        dofs = dofs_of(nodes, x.shape[1])
+        values = self.skin.size_slopes(x, np.arange(len(self.skin.nodes))).ravel()
+        dofs = dofs_of(self.skin.nodes, x.shape[1])
         rows = np.repeat(np.arange(len(dofs)), dofs.shape[1])
         by_x = sparse.coo_array((values, (rows, dofs.ravel())), shape=(len(dofs), x.size))
         per_area = sparse.diags_array(1 / self._undeformed)
