@@ -47,11 +47,16 @@ class Halfway:
 
     def still(self, joints: Joints, at: Met) -> tuple[Posed, Array]:
         """The problem of joints that keep still, u1 = 0, and what c (k, 3) that is."""
-        nc, posed = len(at.keys), self.posed(at)
-        omega = to_global(self.middle[2], self.middle[3])
+        posed, omega = self.posed(at), to_global(self.middle[2], self.middle[3])
+        left = self._left_out(joints, at, posed)
+        return posed, velocities(joints_of(at), self.before.velocity, omega) + left
+
+    def _left_out(self, joints: Joints, at: Met, posed: Posed) -> Array:
+        """What joints contradict, (k, 3), which is taken off q."""
+        nc = len(at.keys)
         left = joints.contradicted(joints_of(at), self.mobility[1], posed.q[nc:])
         posed.q[nc:] -= left
-        return posed, velocities(joints_of(at), self.before.velocity, omega) + left
+        return left
 
     def mirrored(
         self, joints: Joints, at: Met, c: Array, meet: bool = False
@@ -72,9 +77,7 @@ class Halfway:
             if meet:
                 back = np.minimum(back, np.maximum(u_m[:nc, 0], 0.0))
             posed.q[:nc, 0] -= np.minimum(at.hung.pulled(c, len(v)) - back, 0.0)
-        left = joints.contradicted(joints_of(at), self.mobility[1], posed.q[nc:])
-        posed.q[nc:] -= left
-        return posed, c + left
+        return posed, c + self._left_out(joints, at, posed)
 
     def closed(self, joints: Joints, at: Met) -> tuple[Met, Posed, Array]:
         """The problem where joints close at the end, and c (k, 3).
@@ -106,7 +109,7 @@ def closed_beside(  # noqa: PLR0913
     joints come to beside these contacts, and with that the chords and c of the next.  Parts
     that come no nearer to it, as those wedged between contacts, keep the rows of the middle.
     """
-    nc, linked = len(at.keys), joints.pattern[3]
+    linked = joints.pattern[3]
     c = np.zeros_like(at.apart)
     first = at, solved, c
     now, last, least = at, np.full(len(c), np.inf), np.zeros(len(c))
@@ -127,10 +130,9 @@ def closed_beside(  # noqa: PLR0913
         if failed.all():
             return first
         last = left
-        theirs: list[Any] = [part[nc:] for part in at.rows]
         chosen: list[Any] = [
             np.where(failed.reshape(-1, *[1] * (old.ndim - 1)), old, new)
-            for old, new in zip(theirs, rows, strict=True)
+            for old, new in zip(joints_of(at), rows, strict=True)
         ]
         now, c = _with_joints(at, Rows(*chosen)), np.where(failed[:, None], 0.0, aim)
         posed, c = half.mirrored(joints, now, c, meet=True)
