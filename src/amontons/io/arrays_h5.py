@@ -24,7 +24,7 @@ MEANING = {  # name: (unit, what it is)
     "margin": ("force", "distance of every contact to its next status, (contacts,)"),
     "points": ("length", "where the contacts are, undeformed, (contacts, d)"),
     "frames": ("1", "local frames, rows n, t1, t2, (contacts, d, d)"),
-    "weights": ("area", "area of every contact, undeformed, (contacts,)"),
+    "weights": ("area", "area of every contact, current with kinematics finite, (contacts,)"),
     "pressure": ("stress", "normal traction, > 0 in compression, (contacts,)"),
     "shear": ("stress", "tangential traction on the slave in the local frame, (contacts, d-1)"),
     "force": ("force", "force on the slave, global axes, (contacts, d)"),

@@ -17,6 +17,7 @@ from scipy import sparse
 
 from ..linear.blocks import spatial
 from ..mechanics.meshes.cells import CELLS
+from ..mechanics.model.faced import Onto
 from ..mechanics.model.matching import pairs_of
 
 if TYPE_CHECKING:
@@ -61,17 +62,21 @@ def contact_fields(
 
     COPEN gap, CPRESS pressure, CSHEAR and CSLIP lengths of the shear traction and of the
     tangential displacement since the start, CSLIP_ACCUMULATED length of the way slid,
-    CFRICTION_WORK energy per area that it took, CSTATUS 0 open, 1 slip, 2 stick and -1 off the
-    contact surfaces, CSLIDING 0 or 1, CSIDE 1 slave, 2 master, 3 both, CFORCE force and
-    CTRACTION force per area on the body, global axes.
+    CFRICTION_WORK energy per undeformed area that it took, CSTATUS 0 open, 1 slip, 2 stick and
+    -1 off the contact surfaces, CSLIDING 0 or 1, CSIDE 1 slave, 2 master, 3 both, CFORCE force
+    and CTRACTION force per area on the body, global axes.  Areas of pressures and tractions are
+    those of `ContactFields`.
 
     Where several pairs meet at a node, forces, pressures and tractions are summed up; COPEN is
     the least of them, the others are the most.
     """
     sides = [_slaves(model, fields, sliding, starts)]
-    for contact, placed, numbers in pairs_of(model):
-        if contact.master is not None:
-            sides += _masters(sides[0], placed, numbers, fields, int(starts[placed.body]))
+    for k, (contact, placed, numbers) in enumerate(pairs_of(model)):
+        if contact.master is None:
+            continue
+        now = None if fields.faced is None else fields.faced.onto[k]
+        onto = _onto(placed, numbers, fields, int(starts[placed.body])) if now is None else now
+        sides += _masters(sides[0], onto, numbers, fields)
     whole = _Side(*(
         np.concatenate([getattr(side, field.name) for side in sides])
         for field in fields_of(_Side)
@@ -110,33 +115,37 @@ def _slaves(
 ) -> _Side:
     """All contacts on their slaves."""
     at = starts[fields.body] + fields.node
-    share = _shares(model, fields, at)
+    share, undeformed = _shares(model, fields, at), model.discretisation.sites.weights
     shear = np.einsum("ik,ikc->ic", fields.shear, fields.frames[:, 1:])
     return _Side(
         at, np.full(len(at), SLAVE), fields.status.astype(np.int64), sliding.astype(np.int64),
         fields.gap, share * fields.pressure, np.linalg.norm(fields.slip, axis=1), fields.path,
-        fields.friction_work / fields.weights, share[:, None] * shear,
+        fields.friction_work / undeformed, share[:, None] * shear,
         share[:, None] * (shear + fields.pressure[:, None] * fields.frames[:, 0]), fields.force,
     )  # fmt: skip
 
 
-def _masters(
-    slaves: _Side, placed: Placed, numbers: Index, fields: ContactFields, first: int
-) -> list[_Side]:
-    """The contacts of a pair on its master; an empty list where they act on no node.
-
-    first: first node of the slave's body.
-    """
+def _onto(placed: Placed, numbers: Index, fields: ContactFields, first: int) -> Onto:
+    """What contacts of a pair give its master; first: first node of the slave's body."""
     d = fields.points.shape[1]
     own = placed.rows.H.tocoo()
     shape: Any = placed.H.shape
     moved = (own.coords[0] + first * d, own.coords[1])
     H = sparse.csc_array(placed.H - sparse.coo_array((own.data, moved), shape=shape).tocsc())
     N = _weights(sparse.csc_array(H[:, ::d]), fields.frames[numbers, 0])
+    r = np.column_stack([fields.pressure, fields.shear])[numbers]
+    r = r * fields.weights[numbers, None]
+    force = (H @ r.ravel()).reshape(-1, d)
+    return Onto(np.arange(len(force)), sparse.csr_array(N), force)
+
+
+def _masters(slaves: _Side, onto: Onto, numbers: Index, fields: ContactFields) -> list[_Side]:
+    """The contacts of a pair on its master; an empty list where they act on no node."""
+    N = onto.parts.tocoo()
     if not N.nnz:
         return []
     node, contact = (np.asarray(each, dtype=np.int64) for each in N.coords)
-    at, index = np.unique(node, return_inverse=True)
+    some, index = np.unique(node, return_inverse=True)
     chosen = numbers[contact]
     share = N.data * fields.weights[chosen]
     size = np.bincount(index, np.abs(share))
@@ -145,20 +154,18 @@ def _masters(
     def mean(values: Array) -> Array:
         columns = values[chosen].reshape(len(chosen), -1)
         sums = [np.bincount(index, share * column) for column in columns.T]
-        return (np.stack(sums, axis=1) / area[:, None]).reshape(len(at), *values.shape[1:])
+        return (np.stack(sums, axis=1) / area[:, None]).reshape(len(some), *values.shape[1:])
 
-    r = np.column_stack([fields.pressure, fields.shear])[numbers]
-    r = r * fields.weights[numbers, None]
-    force = (H @ r.ravel()).reshape(-1, d)[at]
-    main = np.empty(len(at), dtype=np.int64)
+    force = onto.force[some]
+    main = np.empty(len(some), dtype=np.int64)
     order = np.argsort(share, kind="stable")
     main[index[order]] = chosen[order]  # the last one, with the largest share, stays
     shear = np.einsum("ik,ikc->ic", fields.shear, fields.frames[:, 1:])
     return [_Side(
-        at, np.full(len(at), MASTER), slaves.status[main], slaves.sliding[main],
-        mean(fields.gap), mean(fields.pressure), np.maximum(mean(slaves.slip), 0.0),
-        np.maximum(mean(slaves.path), 0.0), np.maximum(mean(slaves.work), 0.0), -mean(shear),
-        force / area[:, None], force,
+        onto.nodes[some], np.full(len(some), MASTER), slaves.status[main],
+        slaves.sliding[main], mean(fields.gap), mean(fields.pressure),
+        np.maximum(mean(slaves.slip), 0.0), np.maximum(mean(slaves.path), 0.0),
+        np.maximum(mean(slaves.work), 0.0), -mean(shear), force / area[:, None], force,
     )]  # fmt: skip
 
 

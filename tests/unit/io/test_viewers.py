@@ -9,6 +9,7 @@ import pytest
 
 import amontons as am
 from amontons.io import results as output
+from amontons.io.contact_fields import contact_fields
 
 SOFT = am.LinearElastic(200, 0.3)
 METHODS = ["nodal", "mortar", "nitsche", am.Nitsche(theta=1.0)]
@@ -49,6 +50,29 @@ def test_both_sides_of_a_uniform_pressure(dim, method, tmp_path):
     np.testing.assert_allclose(fields["stress"][:, dim - 1], -2.0, rtol=1e-7)
     np.testing.assert_allclose(fields["reaction"].sum(axis=0), 0, atol=1e-10)
     assert all(np.isfinite(values).all() for values in fields.values())
+
+
+
+@pytest.mark.parametrize("ends", [("up.bottom", "low.top"), ("low.top", "up.bottom")])
+def test_masters_show_contact_where_it_is_now(ends):
+    """A block that has slid far: pressed nodes of both sides are there, forces cancel."""
+    law = am.NeoHookean(10.0, 0.0)
+    low = am.Body(am.box((3, 1), (6, 1), origin=(0, -1)), am.NeoHookean(1e5, 0.0), name="low")
+    up = am.Body(am.box((1, 1), 2), law, name="up")
+    held = [am.Fix("low.bottom", 0), am.Fix("up.top", (1.6, -0.1))]
+    model = am.Model([low, up], held, [am.Contact(ends[0], master=ends[1], mu=0.0)])
+    found = am.solve(model)
+    starts = np.cumsum([0, *(len(body.mesh.points) for body in model.bodies)])
+    fields = contact_fields(model, found.fields, found.solution.sliding, starts)
+    at = np.concatenate([b.mesh.points + u for b, u in zip(model.bodies, found.displacement,
+                                                           strict=True)])  # fmt: skip
+    assert fields["CFORCE"].sum(axis=0) == pytest.approx(0, abs=1e-12)
+    for side in (1, 2):
+        on = (fields["CSIDE"] == side) & (fields["CPRESS"] > 0)
+        assert 1.4 < at[on, 0].min() < at[on, 0].max() < 3.1
+        np.testing.assert_allclose(fields["CPRESS"][on], 1.0, rtol=0.2)
+        total = abs(fields["CFORCE"][on, 1].sum())
+        assert total == pytest.approx(abs(found.resultant[1]), rel=1e-9)
 
 
 def test_what_slides_shows_its_slip_on_both_sides(tmp_path):

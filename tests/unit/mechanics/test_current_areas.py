@@ -1,7 +1,9 @@
-"""Stresses of contact laws act on the area of now that faces the other side.
+"""Stresses of contact laws, and those that are told, are of the area of now that is faced.
 
 CalculiX 2.20, surface to surface with NLGEOM, gives the same resultants for these slabs and
-blocks as hexahedra: overclosure times stiffness times the area, to all its digits.
+blocks as hexahedra: overclosure times stiffness times the area, to all its digits.  Its CPRESS
+is overclosure times stiffness, also at nodes that are faced by half, CSHEAR1 slip times stick
+slope, and the area that it prints (CF) the one of now.
 """
 
 import numpy as np
@@ -12,7 +14,7 @@ import amontons as am
 from amontons.mechanics.model.large_deformation import large_deformation, large_step
 
 RIGID, SOFT = am.NeoHookean(1e5, 0.0), am.NeoHookean(1.0, 0.3)  # beside springs of contacts
-DEEP, SLID = 1e-3, 4e-4
+DEEP, SLID, TAU = 1e-3, 4e-4, 1e-5
 K, SLOPE = 2.0, 3.0
 CURVE = am.OverclosureCurve([0.0, K * DEEP / 2, K * DEEP], [0.0, DEEP / 4, DEEP])
 SPRINGS = {"mu": 0.9, "stiffness": K, "stick_stiffness": SLOPE}
@@ -49,7 +51,7 @@ def pressed(dim, first, last, **law):
     model = am.Model(bodies, supports, [contact])
     *_, step = am.evolve(model, am.QuasiStatic(1.0), until=3.0)
     assert step.solution.converged
-    return step.fields.resultant
+    return step
 
 
 @pytest.mark.parametrize(("dim", "first", "last", "area", "held"), [
@@ -60,13 +62,22 @@ def test_springs_are_those_of_the_area_that_is_faced(dim, first, last, area, hel
 
     held: what is around nodes whose shear supports take.
     """
-    force = pressed(dim, first, last, **SPRINGS)
+    step = pressed(dim, first, last, **SPRINGS)
+    force = step.fields.resultant
     np.testing.assert_allclose(force[-1], -K * DEEP * area, rtol=2e-4)
     np.testing.assert_allclose(force[0], SLOPE * SLID * (area - held), rtol=2e-3)
+    fields, (pair,) = step.fields, step.pairs.values()
+    touches = fields.status > 0
+    np.testing.assert_allclose(fields.pressure[touches], K * DEEP, rtol=2e-4)
+    free = touches & (abs(fields.shear).max(axis=1) > 1e-5)  # not held along the surface
+    size = np.linalg.norm(fields.shear[free], axis=1)
+    np.testing.assert_allclose(size, SLOPE * SLID, rtol=2e-3)
+    np.testing.assert_allclose(pair.area, area, rtol=2e-4)
+    np.testing.assert_allclose(pair.largest_pressure, K * DEEP, rtol=2e-4)
 
 
 def test_curves_are_those_of_the_area_that_is_faced():
-    force = pressed(2, 3.0, 5.2, mu=0.0, stiffness=CURVE)
+    force = pressed(2, 3.0, 5.2, mu=0.0, stiffness=CURVE).fields.resultant
     np.testing.assert_allclose(force[-1], -K * DEEP * (1 - SLID), rtol=1e-4)
 
 
@@ -86,6 +97,28 @@ def test_a_stretched_body_stands_on_springs_of_its_area():
     contact = am.Contact("bottom", am.Plane((0, 1), (0, DEEP)), mu=0.0, stiffness=K)
     found = am.solve(am.Model([slab], [*sides, am.Fix("top", (None, 0))], [contact]))
     assert found.resultant.ravel()[1] == pytest.approx(4 * K * DEEP, rel=2e-4)
+    np.testing.assert_allclose(found.pressure, K * DEEP, rtol=2e-4)
+
+
+@pytest.mark.parametrize("slave", ["slab", "block"])
+@pytest.mark.parametrize("law", [{"mu": 0.9, "cap": TAU}, {"tresca": TAU}])
+def test_a_bound_is_that_of_the_part_that_is_faced(slave, law):
+    """A block of .2 that ends within facets of the slab, of which whole nodes have .4."""
+    slab = am.box((1, 0.2), (10, 1), origin=(0, -0.2))
+    block = am.box((0.2, 0.1), (2, 1), origin=(0.45, 0))
+    bodies = [am.Body(slab, am.NeoHookean(1.0, 0.3), name="slab"),
+              am.Body(block, am.NeoHookean(1.0, 0.3), name="block")]  # fmt: skip
+    sides = ["slab.top", "block.bottom"][:: 1 if slave == "slab" else -1]
+    contact = am.Contact(sides[0], master=sides[1], **law)
+    push = am.Fix("block.top", (0.05, -2e-3))
+    found = am.solve(am.Model(bodies, [am.Fix("slab.bottom", 0), push], [contact]))
+    assert found.converged
+    fields, (pair,) = found.fields, found.pairs.values()
+    touches = fields.status > 0
+    np.testing.assert_allclose(abs(fields.shear[touches, 0]), TAU, rtol=0.02)  # fading: a mean
+    slid = (fields.areas * fields.shear[:, 0])[touches]
+    np.testing.assert_allclose(abs(slid.sum()), TAU * 0.2, rtol=0.02)
+    assert pair.area == pytest.approx(0.2, rel=0.02)
 
 
 @pytest.mark.parametrize(("dim", "order", "law"), [

@@ -104,17 +104,36 @@ def test_a_bar_in_two_pieces_bends_as_one():
 
 
 def test_a_bond_gives_way_by_force_over_stiffness():
-    """Pulled and sheared; then turned: it opens by the traction over its stiffness."""
+    """Pulled and sheared; then turned: by the traction on its own area over its stiffness."""
     bodies, tie = blocks(cells=((3, 2), (3, 2)), tied=True, stiffness=0.5, stick_stiffness=0.2)
     model = am.Model(bodies, [am.Fix("lower.bottom", 0), am.Fix("upper.top", (0.1, 0.2))],
                      [tie])  # fmt: skip
     found = am.solve(model, tolerance=1e-11)
-    np.testing.assert_allclose(found.gap, -found.pressure / 0.5, atol=1e-9)
-    np.testing.assert_allclose(found.fields.slip, -found.shear / 0.2, atol=1e-9)
+    traction = found.r / model.discretisation.sites.weights[:, None]
+    np.testing.assert_allclose(found.gap, -traction[:, 0] / 0.5, atol=1e-9)
+    np.testing.assert_allclose(found.fields.slip, -traction[:, 1:] / 0.2, atol=1e-9)
     assert found.gap.max() > 0.01
     *_, last = am.evolve(model, am.QuasiStatic(0.5), until=1.0, tolerance=1e-11)
     np.testing.assert_allclose(last.state.force, found.r, atol=1e-8)
     assert abs(last.energies.defect) < 1e-3 * last.energies.turnover
+
+
+@pytest.mark.parametrize(("first", "last", "longer"), [(0.0, 2.0, 1.5), (0.5, 1.5, 1.0)])
+def test_a_bond_acts_on_what_the_sides_share(first, last, longer):
+    """Two slabs that are made longer, and a block on half of its last nodes."""
+    stiff, long = am.NeoHookean(1e5, 0.0), last - first
+    slab = am.box((2, 1), (4, 1), origin=(0, -1))
+    block = am.box((long, 1), (3, 1), origin=(first, 0))
+    bodies = [am.Body(slab, stiff, name="lower"), am.Body(block, stiff, name="upper")]
+    sides = [f"{body}.{side}" for body in ("lower", "upper") for side in ("left", "right")]
+    held = [am.Fix("lower.bottom", (None, 0)), am.Fix("upper.top", (None, 1e-3))]
+    held += [am.Fix(side, (lambda x: (longer - 1) * x[0], None)) for side in sides]
+    tie = am.Contact("lower.top", master="upper.bottom", tied=True, stiffness=2.0)
+    found = am.solve(am.Model(bodies, held, [tie]))
+    (pair,) = found.pairs.values()
+    assert found.resultant.ravel()[1] == pytest.approx(2e-3 * long, rel=2e-4)
+    assert pair.area == pytest.approx(longer * long, rel=2e-4)
+    np.testing.assert_allclose(found.pressure, -2e-3 / longer, rtol=2e-4)
 
 
 @pytest.mark.parametrize(("dim", "order", "law"), [

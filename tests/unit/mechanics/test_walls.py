@@ -176,6 +176,11 @@ def test_where_must_answer_for_every_point():
     model = am.Model([body], [am.Fix("top", 0)], [contact])
     with pytest.raises(am.InvalidInput, match="where to return"):
         model.assemble()
+    none = am.Contact("bottom", am.Plane((0, 1)), mu=0.3, where=lambda x: x[:, 0] > 40)
+    words = r"'bottom': where: .* from \[0, 0\] to \[1, 0\]"
+    with pytest.raises(am.InvalidInput, match=words) as told:
+        am.Model([body], [am.Fix("top", 0)], [none]).assemble()
+    assert told.value.at == ("contacts", 0, "where")
     half = am.Contact("bottom", am.Plane((0, 1)), mu=0.3, where=lambda x: x[:, 0] > 0.4)
     assert am.Model([body], [am.Fix("top", 0)], [half]).assemble().contacts == 2
 

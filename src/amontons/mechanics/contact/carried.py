@@ -29,6 +29,7 @@ from scipy import sparse
 from ...core.errors import UnsupportedForm
 from .current_mortar import MortarMeeting, MortarPair
 from .current_slopes import blocks_of
+from .grown_areas import GrownAreas
 
 Array = NDArray[np.float64]
 Index = NDArray[np.int64]
@@ -40,11 +41,15 @@ FLAT = 1e-6  # singular value over the largest below which nodes lie on a plane
 
 @dataclass(frozen=True, eq=False)
 class TiedPair:
-    """Sides that neither part nor slip: pair, of the undeformed state; rows T (nc, nodes)."""
+    """Sides that neither part nor slip: pair, of the undeformed state; rows T (nc, nodes).
+
+    areas: how those around the slaves grow, for what is told of stresses: bonds keep theirs.
+    """
 
     pair: MortarPair
     rows: sparse.csr_array
     passed: Array
+    areas: GrownAreas
 
     @classmethod
     def of(cls, pair: MortarPair, X: Array, beside: sparse.csr_array) -> TiedPair:
@@ -72,7 +77,8 @@ class TiedPair:
             values, row, column = (np.concatenate(k) for k in zip(*entries, strict=True))
             away = sparse.coo_array((values, (row, column)), shape=rows.shape)
             rows = sparse.diags_array(scale) @ (rows - away.tocsr())
-        return cls(pair, sparse.csr_array(rows), -onto * scale)
+        areas = GrownAreas(pair.slaves, pair.slave, X)
+        return cls(pair, sparse.csr_array(rows), -onto * scale, areas)
 
     @property
     def slaves(self) -> Index:
@@ -135,6 +141,11 @@ class TiedMeeting:
     def growth(self) -> Array:
         """Of `grown_areas`, (nc,): bonds keep their area."""
         return np.ones(len(self.slaves))
+
+    @cached_property
+    def stretch(self) -> Array:
+        """Of areas around the slaves, (nc,), as `grown_areas` has it in front of obstacles."""
+        return self.pair.areas.at(self.x)
 
     @property
     def passed(self) -> Array:

@@ -212,6 +212,14 @@ class Meetings:
         return np.concatenate([part.growth for part in self.parts])
 
     @cached_property
+    def stretch(self) -> Array:
+        """Areas of now that lambda acts on over the undeformed ones, (nc,): of bonds, too."""
+        return np.concatenate([
+            part.stretch if isinstance(part, TiedMeeting) else part.growth
+            for part in self.parts
+        ])  # fmt: skip
+
+    @cached_property
     def passed(self) -> Array:
         """All forces on the slave's side over lambda, (nc,)."""
         return np.concatenate([part.passed for part in self.parts])

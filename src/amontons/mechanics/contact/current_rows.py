@@ -63,7 +63,9 @@ def current_contact(
             f"contact of {surface!r} with itself",
         )
     if tied:
-        found[found] = MortarPair(nodes[found], over, under, free[found]).at(points).met
+        meeting = MortarPair(nodes[found], over, under, free[found]).at(points)
+        weights[found] = meeting.weights
+        found[found] = meeting.met
         if not found.any():
             raise not_facing(slave, surface, *masters[0])
     chosen = nodes[found]

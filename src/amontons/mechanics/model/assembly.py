@@ -23,9 +23,8 @@ from .beside import Beside
 from .constraint_rows import spring_stiffness
 from .constraints import Constraint, Reference, Spring
 from .elimination import Elimination
-from .held import refuse_held
 from .parts import Body, Contact, Fix, Load
-from .placing import Placed, place
+from .placing import Placed, place, refuse_none
 from .rigid import Piece, near_nullspace, pieces
 from .sites import Sites
 from .supports import Prescribed, external_load, locate
@@ -234,8 +233,7 @@ def discretise(
     _check_once(bodies, contacts, placed)
     whole_H = _of_all([p.H for p in placed], beside)
     if contacts and not whole_H.shape[1]:
-        refuse_held([p.held for p in placed], bodies, supports, offsets, prescribed,
-                    between_bodies=any(c.master is not None for c in contacts))  # fmt: skip
+        refuse_none(contacts, placed, bodies, supports, offsets, prescribed)
     load = external_load(bodies, loads, beside)
     d = bodies[0].mesh.dim
     M, H, load = _unknowns(K, whole_H, load, prescribed, free, eliminated)

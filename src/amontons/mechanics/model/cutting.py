@@ -30,10 +30,11 @@ from ..elements.rigid import Rigid
 from ..meshes.mesh import Mesh
 from ..meshes.partition import Cut, sorted_by
 from .assembly import _check_once, _of_all, _placed
-from .held import check_outside, refuse_held
+from .held import check_outside
 from .laws import law_of_placed
 from .model import Model
 from .parts import Body
+from .placing import refuse_none
 from .rigid import loose_modes, near_nullspace, pieces
 from .sites import Sites
 from .supports import Prescribed, external_load
@@ -169,8 +170,7 @@ def whole(model: Model) -> Whole:
     _check_once(bodies, model.contacts, placed)
     H = _of_all([p.H for p in placed], beside)
     if model.contacts and not H.shape[1]:
-        refuse_held([p.held for p in placed], bodies, model.supports, beside.offsets,
-                    prescribed)  # fmt: skip
+        refuse_none(model.contacts, placed, bodies, model.supports, beside.offsets, prescribed)
     for k, held in enumerate(p.held for p in placed):
         if held is not None:
             with within("contacts", k):

@@ -15,6 +15,7 @@ from ...problem.solution import FrictionSolution
 from ..contact import forces
 from ..meshes import Facets
 from .assembly import Discretisation
+from .faced import Faced
 from .parts import Body
 from .reactions import arms, support_forces
 from .references import ReferenceFields, beside_wrench, reference_fields
@@ -34,7 +35,8 @@ class ContactFields(KeepsLocks):
 
     displacement: (nodes, dim) per body, unit of length.  Per contact, in the order of the
     discrete problem: points (nc, d), frames (nc, d, d) with rows n, t1(, t2), weights (nc,)
-    area, gap (nc,) after deformation, pressure (nc,) >= 0 in compression, shear (nc, d-1)
+    area, of now and of what faces the other side where contact is found there, else undeformed,
+    gap (nc,) after deformation, pressure (nc,) >= 0 in compression, shear (nc, d-1)
     traction on the slave in the local frame, slip (nc, d-1) tangential displacement since the
     start, force (nc, d) on the slave in global axes.  resultant (d,): sum of the forces of
     obstacles on slaves, global axes.  body, node (nc,): where the contact sits; facets: per
@@ -43,6 +45,7 @@ class ContactFields(KeepsLocks):
     energy that it took.  reaction: forces of supports at the nodes, (nodes, dim) per body;
     load: resultant of all loads.  references: of what is beside the nodes, None without.
     plastic: of bodies that yield, by number, the history (h,) of their points of integration.
+    faced: what contacts face where they are found in the deformed state, else None.
     """
 
     displacement: tuple[Array, ...]
@@ -66,6 +69,12 @@ class ContactFields(KeepsLocks):
     load: Wrench
     references: ReferenceFields | None = None
     plastic: Mapping[int, Array] | None = None
+    faced: Faced | None = None
+
+    @property
+    def areas(self) -> Array:
+        """Areas (nc,) that `force` acts on: weights, with parts that other slaves leave."""
+        return self.weights if self.faced is None else self.weights * self.faced.passed
 
 
 def recover_fields(

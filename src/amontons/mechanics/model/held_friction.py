@@ -52,9 +52,10 @@ def _missing(model: Model, fields: ContactFields, displacement: Array) -> tuple[
     parts = nonlinear_parts(model)
     contact = parts.contact
     r = np.c_[fields.pressure, fields.shear] * fields.weights[:, None]
-    law = contact.law
+    meeting = contact.meet(parts.X + displacement)
+    law = contact.over(meeting).law
     bound = np.where((r[:, 0] > 0) & rubs(law) & ~law.tied, law.bound(r), 0.0)
-    motion = contact.meet(parts.X + displacement).relative(displacement)
+    motion = meeting.relative(displacement)
     normal = fields.frames[:, 0]
     along = motion - (motion * normal).sum(axis=1)[:, None] * normal
     held = np.linalg.norm(np.where(contact.free, 0.0, along), axis=1)

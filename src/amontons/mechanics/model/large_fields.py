@@ -1,7 +1,7 @@
 """Displacements and contact fields at finite strains, in words of mechanics.
 
-Frames, gaps and slips are those of the deformed state.  pressure and shear are forces per area
-of the reference configuration (first Piola-Kirchhoff), which weights are too.
+Frames, gaps and slips are those of the deformed state, and so are weights, the areas of now
+that `contact.grown_areas` has for stresses of laws: pressure and shear are true stresses.
 """
 
 from __future__ import annotations
@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 
 from ...core.errors import InvalidInput, InvertedCells
 from ...problem.solution import FrictionSolution
+from .faced import Faced
 from .fields import ContactFields, at_once, by_body, load_wrench
 from .nodal_forces import nodal_forces
 from .nonlinear_parts import nonlinear_parts
@@ -37,8 +38,9 @@ def recover_large(
     sites = linear.sites
     meeting = parts.meet(moved)
     axes = meeting.frames
-    force = np.einsum("pkc,pk->pc", axes, r) * meeting.passed[:, None]
-    traction = r / sites.weights[:, None]
+    own = np.einsum("pkc,pk->pc", axes, r)
+    faced = Faced.of(meeting, sites.weights, own)
+    force, traction = own * faced.passed[:, None], r / faced.areas[:, None]
     load = (model.load_factor * nodal_forces(model, model.loads)).at(moved)
     pushed = meeting.pushed(axes, r)
     try:
@@ -47,12 +49,12 @@ def recover_large(
         held = np.zeros_like(whole)
     displacement = by_body(model.bodies, linear, whole)
     return ContactFields(
-        displacement=displacement, points=parts.points, frames=axes, weights=sites.weights,
+        displacement=displacement, points=parts.points, frames=axes, weights=faced.areas,
         gap=u[:, 0], pressure=traction[:, 0], shear=traction[:, 1:], slip=u[:, 1:],
         force=force, resultant=force.sum(axis=0),
         body=sites.body, node=sites.node,
         facets=tuple((k, model.bodies[k].mesh.surface(name)) for k, name in surfaces),
         reaction=by_body(model.bodies, linear, held),
         load=load_wrench(model, displacement, load), status=solution.status,
-        references=None, **at_once(solution),
+        references=None, faced=faced, **at_once(solution),
     )  # fmt: skip

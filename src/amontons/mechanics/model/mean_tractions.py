@@ -55,16 +55,16 @@ def mean_tractions(solved: Solved) -> Array:
     solved: what `solve` returns of a model, or a step of `evolve`.  `pressure` and `shear` are
     force over area of each node alone; with tetrahedra of first order out of a mesh generator
     these scatter, and means have half of the error where a contact is ten facets wide or more.
-    Elsewhere (hexahedra, second order) nodes are better.  Areas are undeformed.  Contacts that
-    do not sit on corners of facets, one at each (Nitsche's, nodal ones of second order), keep
-    their own.  Raises InvalidInput for what has no model.
+    Elsewhere (hexahedra, second order) nodes are better.  Areas are those of the fields, M that
+    of undeformed facets.  Contacts that do not sit on corners of facets, one at each (those of
+    Nitsche, nodal ones of second order), keep their own.  Raises InvalidInput without a model.
     """
     if not (hasattr(solved, "model") and hasattr(solved, "fields")):
         raise InvalidInput(
             f"mean_tractions: expected the solution of a model, or a step, got {shown(solved)}"
         )
     model, fields = solved.model, solved.fields
-    out = fields.force / fields.weights[:, None]
+    out = fields.force / fields.areas[:, None]
     for (body, facets), (_, _, numbers) in zip(fields.facets, pairs_of(model), strict=True):
         blocks = [corner_facets(block) for block in facets]
         nodes = fields.node[numbers]

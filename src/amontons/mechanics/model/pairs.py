@@ -17,7 +17,6 @@ if TYPE_CHECKING:
     from .fields import ContactFields
     from .model import Model
     from .parts import Contact
-    from .placing import Placed
 
 Array = NDArray[np.float64]
 Index = NDArray[np.int64]
@@ -40,10 +39,10 @@ class PairResult(Acting):
     """What one contact pair transmits.
 
     name, slave, master: as in the model, master None with an obstacle, whose kind is then in
-    `obstacle`: "plane", "sphere" or "levelset".  area: of what touches, undeformed; in 2D a
-    length, and forces are per thickness.  largest_pressure: stress >= 0.  friction_work:
-    energy >= 0 that friction has taken since the start.  share_sticking: area that sticks over
-    area that touches, 0 where nothing does.
+    `obstacle`: "plane", "sphere" or "levelset".  area: of what touches, of now where contact
+    is found there, else undeformed; in 2D a length, and forces are per thickness.
+    largest_pressure: stress >= 0.  friction_work: energy >= 0 that friction has taken since
+    the start.  share_sticking: area that sticks over area that touches, 0 where nothing does.
     """
 
     name: str
@@ -78,18 +77,16 @@ def pair_results(model: Model, fields: ContactFields) -> dict[str, PairResult]:
         first = int(starts[placed.body])
         nodes, forces = model.formulation.forces_of_pair(placed, fields, numbers)
         wrench = Wrench.of(at[first + nodes], forces)
-        out[name] = _result(name, contact, placed, numbers, fields, wrench)
+        out[name] = _result(name, contact, numbers, fields, wrench)
     return out
 
 
-def _result(  # noqa: PLR0913
-    name: str, contact: Contact, placed: Placed, numbers: Index, fields: ContactFields,
-    wrench: Wrench,
-) -> PairResult:  # fmt: skip
+def _result(
+    name: str, contact: Contact, numbers: Index, fields: ContactFields, wrench: Wrench
+) -> PairResult:
     status = fields.status[numbers]
     touches, sticks = status != ContactStatus.OPEN, status == ContactStatus.STICK
-    area = float(placed.rows.weights[touches].sum())
-    stuck = float(placed.rows.weights[sticks].sum())
+    area, stuck = (float(fields.areas[numbers[some]].sum()) for some in (touches, sticks))
     net = np.linalg.norm(fields.slid[numbers], axis=1)
     obstacle = contact.obstacle
     return PairResult(

@@ -37,8 +37,8 @@ from ..meshes.mesh import Mesh
 from ..meshes.surfaces import facet_normals
 from .elimination import Elimination
 from .following import followed, following_columns
-from .held import HeldNodes
-from .parts import FINITE, Body, Contact
+from .held import HeldNodes, refuse_held
+from .parts import FINITE, Body, Contact, Fix
 from .supports import Prescribed, locate
 
 Array = NDArray[np.float64]
@@ -349,6 +349,28 @@ def _wanted(contact: Contact, points: Array) -> NDArray[np.bool_]:
             f"for points {points.shape}, got {wanted.dtype} of shape {wanted.shape}"
         )
     return wanted
+
+
+def refuse_none(
+    contacts: Sequence[Contact], placed: Sequence[Placed], bodies: Sequence[Body],
+    supports: Sequence[Fix], offsets: Index, prescribed: Array,
+) -> None:  # fmt: skip
+    """Raise InvalidInput: no contact is left, by `where` or as supports hold all nodes."""
+    for k, (contact, own) in enumerate(zip(contacts, placed, strict=True)):
+        points = own.all_points
+        if not _wanted(contact, points).any():
+            ends = " to ".join(
+                f"[{', '.join(f'{c:.6g}' for c in end)}]"
+                for end in (points.min(axis=0), points.max(axis=0))
+            )
+            raise InvalidInput(
+                f"expected True for at least one of the {len(points)} {own.each}s, which lie "
+                f"from {ends}; got False for all of them: let it select some, in the unit of "
+                "the mesh, or leave the contact out", ("contacts", k, "where"),
+                f"contact on {contact.slave!r}: where",
+            )  # fmt: skip
+    refuse_held([own.held for own in placed], bodies, supports, offsets, prescribed,
+                between_bodies=any(c.master is not None for c in contacts))  # fmt: skip
 
 
 def _shifted(H: sparse.csc_array, offset: int, size: int) -> sparse.csc_array:

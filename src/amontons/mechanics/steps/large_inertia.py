@@ -47,6 +47,7 @@ from ..elements.corotational import CorotationalBody
 from ..elements.discrete_gradient import DiscreteBody
 from ..elements.elasticity import materials_by_region
 from ..model import Model
+from ..model.faced import Faced
 from ..model.nonlinear_parts import nonlinear_parts
 from ..model.reactions import support_forces
 from .energy import Energies
@@ -374,7 +375,8 @@ class _Step:
                     state.slip + h * mean,
                     **rubbed(state, slip, sliding, np.minimum(work, 0.0)))  # fmt: skip
         meeting = self.parts.meet(q1.reshape(m.parts.X.shape))
+        force = np.einsum("pkc,pk->pc", meeting.frames, impulse / h)
         load = self.load.at(((state.displacement + q1) / 2).reshape(m.parts.X.shape))
         return TimeStep(m.motion.body, new, solution, self.active, energies, meeting.gap,
-                        support_forces(m._all, held / h), load,
-                        meeting.frames)  # fmt: skip
+                        support_forces(m._all, held / h), load, meeting.frames,
+                        faced=Faced.of(self.meeting, m._all.sites.weights, force))  # fmt: skip

@@ -20,6 +20,7 @@ from ..contact.current_mortar import MortarMeeting
 from ..contact.surface_axes import still_drawn
 from ..model import Model
 from ..model.diagnosis import with_diagnosis
+from ..model.faced import Faced
 from ..model.large_deformation import LargeDeformation, large_step
 from ..model.nodal_forces import NodalForces
 from ..model.nonlinear_parts import nonlinear_parts
@@ -83,6 +84,7 @@ class LargeSlowModel:
         q1 = problem.displacement(solution.v).ravel()
         meeting = problem.contact_point(solution.v).meeting
         axes = meeting.frames
+        force = np.einsum("pkc,pk->pc", axes, solution.r)
         if drawn is not None:
             drawn = still_drawn(drawn, axes, problem.parts.contact.free)
         tied = body.law.tied[:, None]  # what bonds give way is no slip
@@ -103,9 +105,10 @@ class LargeSlowModel:
         self._acted = new, body, acting
         rest = acting.inner - acting.load - acting.pushed
         active = np.arange(len(way))
+        faced = Faced.of(meeting, self.motion.parts.sites.weights, force)
         return TimeStep(body, new, solution, active, energies, solution.u[:, 0],
                         support_forces(self.motion.parts, rest), acting.load, axes,
-                        passage, passed=meeting.passed)  # fmt: skip
+                        passage, faced)  # fmt: skip
 
     def _drawn(self, body: Model, state: State) -> Array | None:
         """How far springs along the surface are drawn, (nc, d-1); None without any."""

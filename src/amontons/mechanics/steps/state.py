@@ -19,6 +19,7 @@ from ...problem.solution import ContactStatus, FrictionSolution
 from ..contact import forces
 from ..model import ContactFields, Fix, Model
 from ..model.doubts import model_warnings
+from ..model.faced import Faced
 from ..model.fields import by_body, load_wrench
 from ..model.pairs import PairResult, pair_results
 from ..model.reactions import SupportResult, support_results
@@ -94,8 +95,8 @@ class TimeStep(Shown):
     after the step, unit of length.  frames (nc, d, d): those of the deformed state where it is
     large, else those of the model hold.  passage: the path of the step where it was followed.
     reaction, load (dofs,): nodal forces of supports, and of loads, at the end of the step, in
-    dynamics their means over it.  passed (nc,): forces on the slave's side over those at the
-    slaves, None where they are the same.
+    dynamics their means over it.  faced: what contacts face in a deformed state, None where
+    the model says it.
     """
 
     model: Model
@@ -108,7 +109,7 @@ class TimeStep(Shown):
     load: Array
     frames: Array | None = None
     passage: Passage | None = None
-    passed: Array | None = None
+    faced: Faced | None = None
 
     @property
     def time(self) -> float:
@@ -154,10 +155,11 @@ class TimeStep(Shown):
         surfaces = [locate(self.model.bodies, c.slave) for c in self.model.contacts]
         frames = sites.frames if self.frames is None else self.frames
         force = self._force
-        traction = self.state.force / sites.weights[:, None]
+        weights = sites.weights if self.faced is None else self.faced.areas
+        traction = self.state.force / weights[:, None]
         return ContactFields(
             displacement=self.displacement, points=sites.points,
-            frames=frames, weights=sites.weights, gap=self.gap, pressure=traction[:, 0],
+            frames=frames, weights=weights, gap=self.gap, pressure=traction[:, 0],
             shear=traction[:, 1:], slip=self.state.slip, force=force,
             resultant=force.sum(axis=0),
             body=sites.body, node=sites.node,
@@ -165,6 +167,7 @@ class TimeStep(Shown):
             status=self.status, slid=self.state.slid, path=self.state.path,
             friction_work=self.state.friction_work, reaction=self._split(self.reaction),
             load=load_wrench(self.model, self.displacement, self.load), plastic=self._plastic,
+            faced=self.faced,
             references=reference_fields(self.model.discretisation, self.state.displacement,
                                         self.reaction, self.load),
         )  # fmt: skip
@@ -203,7 +206,7 @@ class TimeStep(Shown):
         """Contact forces on the slaves, (nc, d), global axes."""
         if self.frames is not None:
             force = np.einsum("pkc,pk->pc", self.frames, self.state.force)
-            return force if self.passed is None else force * self.passed[:, None]
+            return force if self.faced is None else force * self.faced.passed[:, None]
         placed = self.model.discretisation.placed
         return forces([p.rows for p in placed], self.state.force)
 
