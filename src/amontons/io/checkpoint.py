@@ -20,7 +20,7 @@ from ..core.errors import FileFormatError, InvalidInput
 from ..core.files import check_is_regular, make_folder
 from ..core.hdf5 import check_contained
 from ..mechanics.steps import State, TimeStep
-from ..mechanics.steps.state import ARRAYS, RUBBED
+from ..mechanics.steps.state import ARRAYS, MORE, RUBBED
 from ..solvers import Iterate
 from .fclib import DAMAGE, write_fclib, write_hdf5
 
@@ -146,8 +146,9 @@ def _put_state(file: h5py.File, state: State) -> None:
     group["index"], group["time"] = state.index, state.time
     for name in (*ARRAYS, *RUBBED):
         group[name] = getattr(state, name)
-    if state.plastic.size:
-        group["plastic"] = state.plastic
+    for name in MORE:
+        if getattr(state, name).size:
+            group[name] = getattr(state, name)
 
 
 def _read(
@@ -175,7 +176,7 @@ def _state(path: Path, file: h5py.File) -> State:
     if GROUP not in file:
         raise FileFormatError(f"{path}: /{GROUP}: missing group")
     group: Any = file[GROUP]
-    more = RUBBED | {"plastic": 1}
+    more = RUBBED | dict.fromkeys(MORE, 1)
     known = ARRAYS | {name: k for name, k in more.items() if name in group}
     values = {name: np.asarray(group[name][()], dtype=float) for name in known}
     for name, dimensions in known.items():
@@ -211,7 +212,7 @@ def _digest(checkpoint: Checkpoint, case: str) -> bytes:
     names = (*ARRAYS, *RUBBED) if checkpoint.counts_slip else tuple(ARRAYS)
     parts = [np.array([state.index]), np.array([state.time]),
              *(getattr(state, name) for name in names),
-             *([state.plastic] if state.plastic.size else []),
+             *(more for name in MORE if (more := getattr(state, name)).size),
              checkpoint.table, checkpoint.pictures]  # fmt: skip
     whole = hashlib.sha256(case.encode())
     if checkpoint.counts_slip:  # older versions have no record either

@@ -207,6 +207,32 @@ def test_laws_of_stresses_are_those_of_small_strains(law):
         assert found[1][0] == pytest.approx(1 - 3 * 0.05, abs=1e-9)
 
 
+def test_stresses_of_laws_act_on_areas_of_now(tmp_path):
+    """A slab on springs and a cap, made twice as long, then moved: books close, it restarts."""
+    K, deep, cap = 2.0, 1e-2, 1e-3
+    slab = am.Body(am.box((2, 1), (2, 1)), am.NeoHookean(1e4, 0.0, density=1e-5))
+
+    def moved(x, t):
+        return x[0] * min(t, 1.0) + 0.1 * max(t - 1.0, 0.0)
+
+    held = [am.Fix(side, (moved, None)) for side in ("left", "right")]
+    held += [am.Fix("top", (None, 0))]
+    contact = am.Contact("bottom", am.Plane((0, 1), (0, deep)), mu=0.9, cap=cap, stiffness=K)
+    model, method = am.Model([slab], held, [contact]), am.MoreauJean(0.1, mass_damping=10.0)
+    steps = list(am.evolve(model, method, until=1.6))
+    last, fields = steps[-1], steps[-1].fields
+    np.testing.assert_allclose(fields.pressure, K * deep, rtol=2e-4)
+    assert last.resultant()[1] == pytest.approx(4 * K * deep, rel=2e-4)
+    assert abs(fields.shear[1, 0]) == pytest.approx(cap, rel=1e-9)
+    assert all(abs(step.energies.defect) < 1e-13 * step.energies.total for step in steps)
+    brought = -sum(step.energies.numerical for step in steps)
+    grown = 4 - 2 * steps[0].state.growth[0]  # since it stands on its springs
+    assert brought == pytest.approx(0.5 * K * deep**2 * grown, rel=2e-3)
+    am.save_state(tmp_path / "half.h5", steps[7].state)
+    *_, again = am.evolve(model, method, until=1.6, start=am.load_state(tmp_path / "half.h5"))
+    np.testing.assert_array_equal(again.state.force, last.state.force)
+
+
 def all_momenta(model, step):
     """Momentum and moment of momentum of all bodies."""
     both = zip(model.bodies, step.displacement, step.v, strict=True)

@@ -61,7 +61,8 @@ class Energies:
     loads, supports: work done on the bodies.  elastic: with that of contacts which give way.
     contact: work of all contacts and impacts but for what they store so, never positive.
     damping: dissipated, never negative.  numerical: lost in the time scheme, never negative in
-    dynamics, in quasi-static steps what a straight line misses.  gain: of kinetic + elastic.
+    dynamics but for springs of contacts on areas that grow, in quasi-static steps what a
+    straight line misses.  gain: of kinetic + elastic.
     """
 
     kinetic: float = 0.0

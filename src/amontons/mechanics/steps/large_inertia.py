@@ -14,7 +14,9 @@ Gaps are those at q0; normals, tangents and averages, in H, those of q0 + h v0 /
 nor moment there, and the law has the motions H^T v that they work on.  A contact takes part
 where its gap and `prediction` h u_N are not positive together; its law is that of
 `moreau_jean`: between r and u1 + e u0, and where contacts would create energy on u_theta, with
-bounds of impulses, and springs of contacts that give way as in `springs`.
+bounds of impulses, and springs of contacts that give way as in `springs`.  Stresses of the law
+act on the areas of those averages (`contact.grown_areas`).  Springs keep how far they are drawn
+when an area grows: energy that brings is no work, and -`numerical`.
 
 Ties have the averages T of `contact.carried`, which never change: T v1 = 0, so that they do no
 work on v_h, and as T q_h = 0 their impulses have neither sum nor moment.  A bond has springs
@@ -41,6 +43,7 @@ from scipy import sparse
 from ...core.clock import NEVER, Deadline
 from ...core.errors import InvertedCells, NotConverged
 from ...problem.friction import FrictionProblem
+from ...problem.law import Law
 from ...problem.solution import FrictionSolution
 from ...solvers.contract import Iterate
 from ..elements.corotational import CorotationalBody
@@ -103,8 +106,12 @@ class LargeMovingModel:
         weights = self._all.sites.weights
         self._closed = TOUCHING * weights ** (1 / (model.dimension - 1))
         self.springs = Springs.of(body.law, model.dimension)
-        self.law = self.springs.of_impulses(body.law, method.step, method.theta)
         self.fixed = np.setdiff1d(np.arange(self._all.dofs), self.parts.free)
+
+    def springs_on(self, grown: Array) -> tuple[Law, Springs]:
+        """The law of forces, and its springs, on areas grown (nc,) times; none: undeformed."""
+        law = self.motion.body.law.scaled(grown if grown.size else 1.0)
+        return law, Springs.of(law, self.parts.dimension)
 
     def begin(self, state: State) -> State:
         """The state before the first step: as it is."""
@@ -139,7 +146,6 @@ class LargeMovingModel:
         parts = zip(self._bodies, *both, strict=True)
         return np.concatenate([body.between(a, b).ravel() for body, a, b in parts])
 
-
     def lost(self, before: Array, after: Array) -> float:
         """Energy that viscosity takes on a way between displacements (dofs,)."""
         shape, ends = self.parts.X.shape, self.parts.ends
@@ -164,18 +170,24 @@ class _Step:
         self.H = sparse.csc_array(meeting.columns(meeting.frames))
         u0 = self.local(v0)
         closing = start.gap + method.prediction * h * u0[:, 0] <= model._closed
-        springs, tied = model.springs, model.law.tied
+        springs, tied = model.springs, motion.body.law.tied
         self.active = np.flatnonzero((closing | springs.presses | tied) & meeting.met)
-        self.law = model.law.at(self.active)
+        stressed = motion.body.law.has_stresses
+        self.growth = meeting.growth if stressed else np.zeros(0)
+        law, self.springs = model.springs_on(self.growth)
+        self.law = self.springs.of_impulses(law, h, method.theta).at(self.active)
+        # forces that draw springs as far on the areas of now as those before did on theirs
+        grown = self.growth / state.growth if state.growth.size else self.growth
+        self.drawn = state.force * grown[:, None] if stressed else state.force
         self.load = 0.5 * (motion.load(state.time) + motion.load(time))
         self.held = (motion.prescribed(time) - motion.prescribed(state.time)) / h
-        gap, pulled = start.gap.copy(), state.force.copy()
+        gap, pulled = start.gap.copy(), self.drawn.copy()
         if tied.any():  # as far as bonds are drawn, in the frames of this step
             drawn = np.einsum("pkc,pc->pk", meeting.frames, start.distances())
-            gap[tied], give = drawn[tied, 0], springs.C
+            gap[tied], give = drawn[tied, 0], self.springs.C
             pulled[tied] = (-drawn / np.where(give > 0, give, np.inf))[tied]
         self.shifts = Shifts.of(u0[self.active], gap[self.active], method,
-                                springs.at(self.active), pulled[self.active],
+                                self.springs.at(self.active), pulled[self.active],
                                 tied[self.active])  # fmt: skip
         d = u0.shape[1]
         columns = (self.active[:, None] * d + np.arange(d)).ravel()
@@ -349,13 +361,16 @@ class _Step:
         kinetic, elastic = 0.5 * v1 @ (m.M @ v1), m.parts.energy(q1.reshape(shape))
         gain = kinetic + elastic - 0.5 * v0 @ (m.M @ v0) - m.parts.energy(q0.reshape(shape))
         load = self.load.at(((q0 + q1) / 2).reshape(shape))
-        stored = m.springs.energy(self._whole(trial.impulse) / h)
-        taken = stored - m.springs.energy(self.state.force)
+        stored = self.springs.energy(self._whole(trial.impulse) / h)
+        taken = stored - self.springs.energy(self.drawn)
+        before = m.springs_on(self.state.growth)[1].energy(self.state.force)
         return Energies(
-            kinetic=float(kinetic), elastic=float(elastic) + stored, gain=float(gain) + taken,
-            loads=float(load @ dq), supports=float(held @ dq) / h,
+            kinetic=float(kinetic), elastic=float(elastic) + stored,
+            gain=float(gain) + stored - before, loads=float(load @ dq),
+            supports=float(held @ dq) / h,
             contact=float(self._pushed(trial.turned, trial.impulse) @ dq) / h + taken,
             damping=float(dq @ (m.C @ dq)) / h + m.lost(q0, q1),
+            numerical=before - self.springs.energy(self.drawn),
         ), held  # fmt: skip
 
     def done(
@@ -366,14 +381,15 @@ class _Step:
         q1, impulse = self._moved(trial.velocity), self._whole(trial.impulse)
         mean = 0.5 * (self._before + self.after(trial))
         mean += 0.5 * self._whole(self._more(trial, self.state.velocity))
-        slip = m.springs.slipped(h * mean, state.force, impulse / h)
+        slip = self.springs.slipped(h * mean, self.drawn, impulse / h)
         mean = mean[:, 1:]
-        work = (impulse[:, 1:] * mean).sum(axis=1) + m.springs.taken(state.force, impulse / h)
+        work = (impulse[:, 1:] * mean).sum(axis=1) + self.springs.taken(self.drawn, impulse / h)
         sliding = np.zeros(len(mean), dtype=bool)
         sliding[self.active] = solution.sliding
         new = State(state.index + 1, self.time, q1, trial.velocity, impulse / h,
                     state.slip + h * mean,
-                    **rubbed(state, slip, sliding, np.minimum(work, 0.0)))  # fmt: skip
+                    **rubbed(state, slip, sliding, np.minimum(work, 0.0)),
+                    growth=self.growth)  # fmt: skip
         meeting = self.parts.meet(q1.reshape(m.parts.X.shape))
         force = np.einsum("pkc,pk->pc", meeting.frames, impulse / h)
         load = self.load.at(((state.displacement + q1) / 2).reshape(m.parts.X.shape))

@@ -101,7 +101,8 @@ class LargeSlowModel:
         velocity = (q1 - q0) / passed if passed else np.zeros_like(q1)
         new = State(state.index + 1, time, q1, velocity, solution.r,
                     np.where(tied, solution.u[:, 1:], state.slip + way),
-                    **rubbed(state, slid, solution.sliding, work))  # fmt: skip
+                    **rubbed(state, slid, solution.sliding, work),
+                    growth=meeting.growth if body.law.has_stresses else None)  # fmt: skip
         self._acted = new, body, acting
         rest = acting.inner - acting.load - acting.pushed
         active = np.arange(len(way))

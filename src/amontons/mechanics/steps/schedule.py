@@ -82,5 +82,6 @@ def carried_over(state: State, old: Motion, new: Motion) -> State:
     return replace(
         state, force=taken(state.force), slid=taken(state.slid), path=taken(state.path),
         friction_work=taken(state.friction_work),
+        growth=1 + taken(state.growth - 1) if state.growth.size else None,
         slip=after.local(state.displacement)[:, 1:],
     )  # fmt: skip

@@ -36,6 +36,7 @@ Array = NDArray[np.float64]
 Index = NDArray[np.int64]
 ARRAYS = {"displacement": 1, "velocity": 1, "force": 2, "slip": 2}  # name: dimensions
 RUBBED = {"slid": 2, "path": 1, "friction_work": 1}  # the same of what no step needs
+MORE = ("plastic", "growth")  # of one dimension, empty where there is none
 
 
 @dataclass(frozen=True, eq=False)
@@ -47,7 +48,8 @@ class State(KeepsLocks):
     slip (nc, d-1): tangential displacement since the start.  What no step needs, zero where
     it is not given: slid (nc, d-1), what the contacts have slid, net; path (nc,), the length of
     that way; friction_work (nc,), the energy that it took.  plastic (h,): the history of bodies
-    that yield, none or empty where nothing has flown.
+    that yield, none or empty where nothing has flown.  growth (nc,): areas that stresses of the
+    law acted on over undeformed ones, none or empty where they stay, `contact.grown_areas`.
     """
 
     index: int
@@ -60,6 +62,7 @@ class State(KeepsLocks):
     path: Array = None  # type: ignore[assignment]
     friction_work: Array = None  # type: ignore[assignment]
     plastic: Array = None  # type: ignore[assignment]
+    growth: Array = None  # type: ignore[assignment]
 
     def __post_init__(self) -> None:
         index = integers("state: index", self.index)
@@ -78,8 +81,13 @@ class State(KeepsLocks):
             if array.shape != shape:
                 raise InvalidInput(f"state: {name}: expected shape {shape}, got {array.shape}")
             object.__setattr__(self, name, array)
-        given = np.zeros(0) if self.plastic is None else self.plastic
-        object.__setattr__(self, "plastic", finite("state: plastic", given, 1))
+        for name in MORE:
+            given = np.zeros(0) if getattr(self, name) is None else getattr(self, name)
+            object.__setattr__(self, name, finite(f"state: {name}", given, 1))
+        if self.growth.size and (self.growth.shape != self.slip.shape[:1]
+                                 or not (self.growth > 0).all()):  # fmt: skip
+            raise InvalidInput(f"state: growth: expected {len(self.slip)} numbers > 0, one for "
+                               f"each contact, got {shown(self.growth)}")  # fmt: skip
 
     @property
     def is_unloaded(self) -> bool:
