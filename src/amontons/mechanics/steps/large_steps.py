@@ -102,7 +102,8 @@ class LargeSlowModel:
         new = State(state.index + 1, time, q1, velocity, solution.r,
                     np.where(tied, solution.u[:, 1:], state.slip + way),
                     **rubbed(state, slid, solution.sliding, work),
-                    growth=meeting.growth if body.law.has_stresses else None)  # fmt: skip
+                    growth=meeting.growth if body.law.has_stresses else np.zeros(0),
+                    )  # fmt: skip
         self._acted = new, body, acting
         rest = acting.inner - acting.load - acting.pushed
         active = np.arange(len(way))
