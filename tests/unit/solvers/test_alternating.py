@@ -43,7 +43,7 @@ def test_a_plane_problem_is_solved_in_its_two_directions():
 def test_sweeps_go_on_alone_where_steps_lead_nowhere(monkeypatch):
     problem = am.SpherePacking(20, mu=0.3, seed=2).problem().condensed()
     way = swept(problem, 5)
-    monkeypatch.setattr(Alternation, "_step", lambda self: None)
+    monkeypatch.setattr(Alternation, "_step", lambda self, r, shift: None)
     before = way.error
     for _ in range(alternating.FAILURES):
         assert way.advance(0.0) == 0
@@ -55,3 +55,27 @@ def test_sweeps_go_on_alone_where_steps_lead_nowhere(monkeypatch):
     assert way.shift == alternating.FIRST_SHIFT
     assert way.error == pytest.approx(problem.error(way.r) * problem.q_norm)
     assert way.error < before
+
+
+def test_a_trap_is_left_along_the_step_with_the_least_shift_from_the_best_reaction():
+    problem = am.SpherePacking(20, mu=0.3, seed=2).problem().condensed()
+    way = swept(problem, 5)
+    best = way.r.copy()
+    step = way._step(best, alternating.LEAST_SHIFT)
+    assert step is not None
+    way.r = np.ones_like(best)  # elsewhere now
+    for part in (*alternating.KICKS, alternating.KICKS[0]):  # to one side and the other
+        moved = part * step * (np.linalg.norm(best) / np.linalg.norm(step))
+        assert way._kicked() == pytest.approx(best + moved)
+
+
+def test_sweeps_alone_and_kicks_leave_traps_in_turn():
+    problem = am.SpherePacking(20, mu=0.3, seed=2).problem().condensed()
+    way = swept(problem, 5)
+    for traps, count in ((1, alternating.WANDERED), (2, alternating.KICKED)):
+        way.failures = alternating.FAILURES
+        assert way.advance(0.0) == count * alternating.SWEEPS
+        assert way.traps == traps
+        assert way.error == pytest.approx(problem.error(way.r) * problem.q_norm)
+    assert way.least <= way.error
+    assert way.least == pytest.approx(problem.error(way.best) * problem.q_norm)

@@ -149,7 +149,7 @@ TRACKS = (
     Entry("smoothing Newton", smoothing_newton, 0.15, 1.0, _steps(30), _has_cone, again=3.0,
           trial=_steps(30), waits=_steps(30)),
     Entry("Anderson Gauss-Seidel, deep", polish, 0.1, 1.0, _deep_sweeps, _can_end, True),
-    Entry("Newton and sweeps", alternating, 0.1, 1.0, _alternations, _has_packing,
+    Entry("Newton and sweeps", alternating, 0.2, 0.3, _alternations, _has_packing,
           waits=_alternations),
     Entry("inexact Newton", inexact_newton, 0.3, 0.3, _at_joints, _has_joints),
     Entry("semismooth Newton", semismooth_newton, 0.1, 1.0, _dense_steps, _has_steps),
