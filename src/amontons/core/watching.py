@@ -21,9 +21,9 @@ from numpy.typing import NDArray
 from .compiled import njit
 
 try:
-    from resource import RUSAGE_THREAD, getrusage  # type: ignore[attr-defined]
-except ImportError:  # not Linux
-    RUSAGE_THREAD = getrusage = None
+    import resource
+except ImportError:  # Windows
+    resource = None
 
 INSTANT = 200e-6  # s that a number is looked at
 MOMENT = 6e-6  # s after it has changed: who has changed it needs the interpreter first
@@ -71,13 +71,14 @@ _nobody: NDArray[np.int64] = np.zeros(1, dtype=np.int64)
 
 def _times_put_off() -> int:
     """How often this thread had to leave a core to others so far."""
-    return getrusage(RUSAGE_THREAD).ru_nivcsw  # type: ignore[misc]
+    assert resource is not None
+    return resource.getrusage(resource.RUSAGE_THREAD).ru_nivcsw  # type: ignore[attr-defined]
 
 
 @cache
 def _looks() -> int:
     """How many looks an instant has; 0 where nobody looks."""
-    if RUSAGE_THREAD is None or config.DISABLE_JIT:
+    if not hasattr(resource, "RUSAGE_THREAD") or config.DISABLE_JIT:
         return 0
     number = np.zeros(1, dtype=np.int64)
     took = []

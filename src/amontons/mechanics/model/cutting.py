@@ -94,8 +94,9 @@ class Share:
     nodes (l,): numbers in the whole model, ascending; number (l,): in PETSc, own ones
     ascending; own (l,); starts (processes + 1,): first numbers of the processes.
     bodies: (number of the body, mesh, material) of its cells, whose nodes follow one another.
-    fixed (o, d) in the frames of contacts; prescribed, load (o, d) in global axes; piece (o,)
-    of own nodes among the connected ones, and where these turn.  framed (q,): local nodes with a contact, their frames (q, d, d).
+    fixed (o, d) in the frames of contacts; prescribed, load (o, d) in global axes; piece (o,):
+    connected one of each own node, and about where pieces turn.
+    framed (q,): local nodes with a contact, their frames (q, d, d).
     coupling: own dofs (local among own), PETSc's dofs of masters, -B' of both, (c,) each.
     all_contacts: of all processes; coupled: whether any process has a coupling.
     """
