@@ -238,7 +238,8 @@ def test_sums():
     *_, size, _, r = same(run)
     assert size == pytest.approx(float(np.linalg.norm(b - 0.3 * a)), rel=1e-13)
     np.testing.assert_allclose(r, b - 0.3 * a, rtol=1e-15, atol=1e-15)
-    at_nodes, kind = rng.standard_normal((60_000, 3)), rng.integers(0, 3, 60_000).astype(np.int8)
+    at_nodes = rng.standard_normal((60_000, 3))
+    kind = rng.integers(0, 3, 60_000).astype(np.int8)
     expected = [np.linalg.norm(at_nodes[some]) for some in (kind != LEFT_OUT, kind == BESIDE)]
     assert same(lambda: norms_of(at_nodes, kind)) == pytest.approx(expected, rel=1e-12)
 

@@ -1,4 +1,4 @@
-"""A number that is looked at before a thread falls asleep: seen when it changes, not for long."""
+"""A number that is looked at before a thread falls asleep: seen when it changes."""
 
 import itertools
 import time
