@@ -185,7 +185,7 @@ def _problem(
     contact[dofs] = True
     matrix = SpreadMatrix(
         comm, rows.pop, _basis(share, comm.rank) if share.coupled else None,
-        modes=turned(share.modes), d=d, fixed=fixed, contact=contact, options=options,
+        modes=lambda: turned(share.modes), d=d, fixed=fixed, contact=contact, options=options,
     )  # fmt: skip
     y = matrix.to_basis(turned(share.prescribed.ravel()))
     y[~fixed] = 0.0
