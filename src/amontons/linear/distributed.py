@@ -71,15 +71,16 @@ class SpreadMatrix:
     rows: gives K of the own unknowns in blocks (own, n), columns in the numbers of PETSc,
     where processes follow one another, and keeps no copy; basis: T = I + C (own, n) in which
     contact is seen on one side, C C = 0, None where nobody has one (the same on all processes).
-    modes (own, k): rigid motions; d: unknowns a node; fixed, contact (own,): directions that
-    supports hold, and those of contacts, whose rows and columns change from step to step.
+    modes: makes the rigid motions (own, k), which are long; d: unknowns a node; fixed, contact
+    (own,): directions that supports hold, and those of contacts, whose rows and columns change
+    from step to step.
     """
 
     def __init__(  # noqa: PLR0913  # what a matrix is made of
         self, comm: Any, rows: Callable[[], sparse.bsr_array], basis: sparse.bsr_array | None,
-        *, modes: Array, d: int, fixed: Mask, contact: Mask, options: Petsc,
+        *, modes: Callable[[], Array], d: int, fixed: Mask, contact: Mask, options: Petsc,
     ) -> None:  # fmt: skip
-        self.comm, self.d, self.options, self.modes = comm, d, options, modes
+        self.comm, self.d, self.options, self._modes = comm, d, options, modes
         self.own, self.directions = len(fixed), int(comm.allreduce(int(contact.sum())))
         self.T = None if basis is None else spread_matrix(comm, basis, d)
         own = rows() if self.T is None else _in_basis(comm, rows(), self.T, d)
@@ -89,8 +90,6 @@ class SpreadMatrix:
         self.product = petsc().Mat().createPython((size, size), Product(self.A), comm=comm)
         self.product.setUp()
         self._x, self._y = self.product.createVecs()
-        if self.T is not None:
-            self.modes = np.stack([self.to_basis(v) for v in modes.T.copy()], axis=1)
         self._take_rows(fixed | contact)
         self.diagonal = self.A.diagonal()
         self._in_matrix = np.where(fixed, FAINT, 1.0) * self.diagonal
@@ -217,10 +216,12 @@ class SpreadMatrix:
         Raises SingularOperator, on all processes, where GMRES does not get there.
         """
         right, x = self._y, self._x
-        right.array = np.where(self.held, 0.0, b)
+        b = np.where(self.held, 0.0, b)
+        right.array = b
         if right.norm() == 0:
             return np.zeros(self.own)
         self._prepare()
+        right.array = b  # levels that were made have used the vector
         self.ksp.setTolerances(rtol=reduction, atol=0.0, max_it=self.options.max_iterations)
         self.ksp.solve(right, x)
         steps = self.ksp.getIterationNumber()
@@ -258,10 +259,13 @@ class SpreadMatrix:
             if part is not None:
                 part.destroy()
         self.cycle = self.other = None
+        modes = self._modes()
+        if self.T is not None:
+            modes = np.stack([self.to_basis(v) for v in modes.T.copy()], axis=1)
         if petsc().Options().getString(PREFIX + "pc_type", "gamg") == "gamg":
-            self.cycle = SpreadCycle(self.A, self.modes, self._changing)
+            self.cycle = SpreadCycle(self.A, modes, self._changing)
         else:
-            self.other = preconditioner(self.A, self.modes)
+            self.other = preconditioner(self.A, modes)
 
     def _below(self) -> Array:
         """Blocks of what coarse matrices are made of, in rows that contacts change."""

@@ -13,11 +13,21 @@ def rigid_modes(points: Array, chosen: NDArray[np.bool_] | None = None) -> Array
 
     points (n, dim); chosen (n,): only these rows, of the same motions.
     """
-    dim = points.shape[1]
+    centre, size = centre_and_size(points)
+    return modes_about((points if chosen is None else points[chosen]) - centre, size)
+
+
+def centre_and_size(points: Array) -> tuple[Array, float]:
+    """About which points (n, dim) turn, and what their rotations are scaled with."""
     centre = points.mean(axis=0)
     size = np.abs([points.max(axis=0) - centre, points.min(axis=0) - centre]).max()
-    x = ((points if chosen is None else points[chosen]) - centre) / (size if size > 0 else 1.0)
-    n = len(x)
+    return centre, float(size) if size > 0 else 1.0
+
+
+def modes_about(arms: Array, size: float | Array) -> Array:
+    """The same of arms (n, dim) from the centre; size: of all, or of each (n, 1)."""
+    x = arms / size
+    n, dim = x.shape
     out = np.zeros((n, dim, 3 if dim == 2 else 6))
     out[:, range(dim), range(dim)] = 1.0
     if dim == 2:

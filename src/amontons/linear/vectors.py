@@ -14,6 +14,7 @@ from ..core.threads import BLOCK, over_blocks, over_rows
 
 Array = NDArray[np.float64]
 Index = NDArray[np.int64]
+LEFT_OUT, BESIDE = 1, 2  # kinds of nodes, see `norms_of`
 
 
 def blocks_of(size: int) -> int:
@@ -31,6 +32,14 @@ def dot(a: Array, b: Array) -> float:
 def norm(a: Array) -> float:
     """|a|."""
     return float(np.sqrt(dot(a, a)))
+
+
+def norms_of(a: Array, kind: NDArray[np.int8]) -> tuple[float, float]:
+    """|a| of (nodes, 3) without the nodes LEFT_OUT, and of those that are BESIDE alone."""
+    sums = np.empty((blocks_of(len(a)), 2))
+    over_blocks(_squares, len(a), 4.0 * len(a), a, kind, sums)
+    rest, beside = np.sqrt(np.add.reduce(sums))
+    return float(rest), float(beside)
 
 
 def copy_into(a: Array, out: Array) -> None:
@@ -93,6 +102,19 @@ def _dot(begin, end, a, b, sums):
         for i in range(first, min(first + BLOCK, end)):
             total += a[i] * b[i]
         sums[first // BLOCK] = total
+
+
+@njit(cache=True, error_model="numpy", nogil=True)
+def _squares(begin, end, a, kind, sums):
+    for first in range(begin, end, BLOCK):
+        rest, beside = 0.0, 0.0
+        for i in range(first, min(first + BLOCK, end)):
+            square = a[i, 0] * a[i, 0] + a[i, 1] * a[i, 1] + a[i, 2] * a[i, 2]
+            if kind[i] != LEFT_OUT:
+                rest += square
+            if kind[i] == BESIDE:
+                beside += square
+        sums[first // BLOCK, 0], sums[first // BLOCK, 1] = rest, beside
 
 
 @njit(cache=True, error_model="numpy", nogil=True)

@@ -321,7 +321,10 @@ class Equations(Matrices):
 
     @np.errstate(over="ignore", invalid="ignore")
     def _residual_error(self, r: Array, v: Array) -> float:
-        law = judge.scaled_residual(r, self.local_velocity(v), self.law, self.rho)
+        motion = kernel_rows(r), kernel_rows(self.local_velocity(v))
+        law = np.inf
+        if all(np.isfinite(part).all() for part in motion):
+            law = judge.error_of_motion(self.law.kind, self.law.parameters, self.rho, *motion)
         error = max(
             self.imbalance(r, v), judge.ratio(law, self.scales[1]), self.unbalanced(r)
         )

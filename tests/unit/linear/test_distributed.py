@@ -97,7 +97,8 @@ class Stored:
 def in_parts(model, processes):
     """The shares, K (n, n) and T (n, n) of all in PETSc's numbers."""
     given, owner = _made(model, processes)
-    every = list(shares(given, owner, processes))
+    found = dict(shares(given, owner, processes))
+    every = [found[rank] for rank in range(processes)]
     K = np.vstack([_rows(share).toarray() for share in every])
     T = np.vstack([_basis(share, rank).toarray() for rank, share in enumerate(every)])
     return every, K, T

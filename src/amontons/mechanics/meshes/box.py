@@ -106,8 +106,8 @@ def _simplices(cube: Index, kind: str) -> Index:
         path = np.cumsum([0, *(1 << axis for axis in order)])
         nodes = [position[p] for p in path]
         odd = np.linalg.det(np.eye(dim)[list(order)]) < 0  # then its image has positive volume
-        pieces.append(cube[:, [nodes[k] for k in MIRROR[kind]] if odd else nodes])
-    return np.stack(pieces, axis=1).reshape(-1, dim + 1)
+        pieces += [nodes[k] for k in MIRROR[kind]] if odd else nodes
+    return np.take(cube, pieces, axis=1).reshape(-1, dim + 1)
 
 
 def _levels(counts: tuple[int, ...], lengths: Array, kind: str) -> tuple[sparse.csr_array, ...]:

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import itertools
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 
 import numpy as np
@@ -126,10 +128,7 @@ def _all_sides(cells: tuple[Cells, ...], size: int) -> NDArray[np.int32]:
 
 def inner_facets(cells: tuple[Cells, ...], facets: tuple[Facets, ...], points: int) -> int:
     """How many of the given facets lie between two cells."""
-    near = np.zeros(points, dtype=bool)
-    for block in facets:
-        near[block.nodes] = True
-    known = sides(cells, near)
+    known = sides(cells, _at_nodes(facets, points))
     count = 0
     for block in facets:
         both = np.concatenate([known[block.nodes.shape[1]], block.nodes])
@@ -139,21 +138,40 @@ def inner_facets(cells: tuple[Cells, ...], facets: tuple[Facets, ...], points: i
 
 
 def oriented(
-    cells: tuple[Cells, ...], facets: tuple[Facets, ...], name: str, points: Array
-) -> tuple[Facets, ...]:
+    cells: tuple[Cells, ...], surfaces: Mapping[str, tuple[Facets, ...]], points: Array
+) -> dict[str, tuple[Facets, ...]]:
     """The same facets outwards, each once; raises InvalidInput if one is no side of a cell.
 
     A facet between two cells takes the direction out of the first.
     """
-    blocks = [Facets(b.kind, _node_table(b, name, points)) for b in facets if len(b.nodes)]
-    near = np.zeros(len(points), dtype=bool)
-    for block in blocks:
+    blocks = {
+        name: [Facets(b.kind, _node_table(b, name, points)) for b in facets if len(b.nodes)]
+        for name, facets in surfaces.items()
+    }
+    near_any = _at_nodes(itertools.chain(*blocks.values()), len(points))
+    known = sides(cells, near_any) if near_any.any() else {}  # one pass over all cells
+    return {name: _sides_of(some, known, name, points) for name, some in blocks.items()}
+
+
+def _at_nodes(facets: Iterable[Facets], points: int) -> NDArray[np.bool_]:
+    """Which points (n,) facets have."""
+    near = np.zeros(points, dtype=bool)
+    for block in facets:
         near[block.nodes] = True
-    known = sides(cells, near)
-    return tuple(
-        Facets(b.kind, _looked_up(b.nodes, known.get(b.nodes.shape[1]), name, points))
-        for b in blocks
-    )
+    return near
+
+
+def _sides_of(
+    facets: list[Facets], known: dict[int, Index], name: str, points: Array
+) -> tuple[Facets, ...]:
+    """The facets of one surface as they are in sides of cells by number of nodes."""
+    near, out = _at_nodes(facets, len(points)), []
+    for block in facets:
+        table = known.get(block.nodes.shape[1])
+        if table is not None:
+            table = table[near[table].all(axis=1)]
+        out.append(Facets(block.kind, _looked_up(block.nodes, table, name, points)))
+    return tuple(out)
 
 
 def _node_table(block: Facets, name: str, points: Array) -> Index:

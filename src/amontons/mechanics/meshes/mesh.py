@@ -72,8 +72,7 @@ class Mesh(KeepsLocks):
             check_integration(block)
         if self.axisymmetric:
             check_half_section(self.points)
-        surfaces = {k: oriented(blocks, v, k, points) for k, v in self.surfaces.items()}
-        object.__setattr__(self, "surfaces", surfaces)
+        object.__setattr__(self, "surfaces", oriented(blocks, self.surfaces, points))
         object.__setattr__(self, "levels", checked_levels(self.levels, len(points)))
         object.__setattr__(self, "node_sets", self._checked_sets())
 

@@ -24,6 +24,7 @@ from numpy.typing import NDArray
 from scipy import sparse
 
 from ...core.errors import InvalidInput, UnsupportedForm, UnsupportedLaw, within
+from ...linear.rigid_modes import centre_and_size, modes_about
 from ...problem.law import Law
 from ..elements.given import GivenMatrices
 from ..elements.rigid import Rigid
@@ -35,7 +36,7 @@ from .laws import law_of_placed
 from .model import Model
 from .parts import Body
 from .placing import refuse_none
-from .rigid import loose_modes, near_nullspace, pieces
+from .rigid import Piece, loose_modes, pieces
 from .sites import Sites
 from .supports import Prescribed, external_load
 
@@ -73,14 +74,30 @@ class Contacts:
 
 
 @dataclass(frozen=True, eq=False)
+class Turning:
+    """Connected pieces: centres (p, d) about which they turn, and their sizes (p, 1)."""
+
+    centres: Array
+    sizes: Array
+
+    @classmethod
+    def of(cls, parts: list[Piece], d: int) -> Turning:
+        """Those of pieces of a model."""
+        known = [centre_and_size(piece.points) for piece in parts]
+        centres = np.array([centre for centre, _ in known]).reshape(-1, d)
+        return cls(centres, np.array([[size] for _, size in known]))
+
+
+@dataclass(frozen=True, eq=False)
 class Share:
     """What one process is given; l local nodes (its own and ghosts), o of them its own.
 
     nodes (l,): numbers in the whole model, ascending; number (l,): in PETSc, own ones
     ascending; own (l,); starts (processes + 1,): first numbers of the processes.
     bodies: (number of the body, mesh, material) of its cells, whose nodes follow one another.
-    fixed (o, d) in the frames of contacts; prescribed, load (o, d) and modes (o d, k) in global
-    axes.  framed (q,): local nodes with a contact, their frames (q, d, d).
+    fixed (o, d) in the frames of contacts; prescribed, load (o, d) in global axes; piece (o,):
+    connected one of each own node, and about where pieces turn.
+    framed (q,): local nodes with a contact, their frames (q, d, d).
     coupling: own dofs (local among own), PETSc's dofs of masters, -B' of both, (c,) each.
     all_contacts: of all processes; coupled: whether any process has a coupling.
     """
@@ -93,7 +110,8 @@ class Share:
     fixed: Mask
     prescribed: Array
     load: Array
-    modes: Array
+    piece: NDArray[np.int32]
+    turning: Turning
     framed: Index
     frames: Array
     contacts: Contacts
@@ -101,6 +119,13 @@ class Share:
     coupled: bool
     all_contacts: int
     counts: tuple[int, ...]
+
+    @property
+    def modes(self) -> Array:
+        """Rigid motions of own nodes, (o d, 3 or 6) in global axes, made anew at every call."""
+        points = np.concatenate([mesh.points for _, mesh, _ in self.bodies])[self.own]
+        turning = self.turning
+        return modes_about(points - turning.centres[self.piece], turning.sizes[self.piece])
 
 
 @dataclass(frozen=True, eq=False)
@@ -112,7 +137,8 @@ class Whole:
     fixed: Mask
     prescribed: Array
     load: Array
-    modes: Array
+    piece: NDArray[np.int32]
+    turning: Turning
     contacts: Contacts
     coupling: sparse.csc_array
 
@@ -194,8 +220,17 @@ def whole(model: Model) -> Whole:
         bodies, np.concatenate([body.mesh.points for body in bodies]), fixed,
         prescribed.reshape(-1, d),
         factor * external_load(bodies, model.loads, beside).reshape(-1, d),
-        near_nullspace(parts, slice(None), beside.total), contacts, B,
+        _numbers(parts, len(fixed)), Turning.of(parts, d), contacts, B,
     )  # fmt: skip
+
+
+def _numbers(parts: list[Piece], nodes: int) -> NDArray[np.int32]:
+    """The piece of every node, (nodes,)."""
+    out = np.empty(nodes, dtype=np.int32)
+    for k, piece in enumerate(parts):
+        d = piece.points.shape[1]
+        out[piece.dofs[::d] // d] = k
+    return out
 
 
 def _in_frames(  # noqa: PLR0913  # what contacts are made of
@@ -277,8 +312,10 @@ def _check_rest(contacts: Contacts, H: sparse.csc_array, prescribed: Array) -> N
         )
 
 
-def shares(given: Whole, owner: Index, processes: int) -> Iterator[Share]:
-    """What the processes get, the first one first; made one after another.  owner (nodes,).
+def shares(given: Whole, owner: Index, processes: int) -> Iterator[tuple[int, Share]]:
+    """What each process gets, made one after another.  owner (nodes,).
+
+    The first process, which makes them, comes last: by then others have begun.
 
     Everything is sorted by process once, so that cutting takes no longer for many of them.
     """
@@ -299,7 +336,7 @@ def shares(given: Whole, owner: Index, processes: int) -> Iterator[Share]:
         Cut(body.mesh, owner[first : first + count], processes)
         for body, first, count in zip(given.bodies, firsts, counts, strict=False)
     ]
-    for rank in range(processes):
+    for rank in (*range(1, processes), 0):
         bodies, kept = [], []
         for k, (cut, body) in enumerate(zip(cuts, given.bodies, strict=True)):
             mesh, used = cut.part(rank)
@@ -308,14 +345,13 @@ def shares(given: Whole, owner: Index, processes: int) -> Iterator[Share]:
                 kept.append(firsts[k] + used)
         nodes = np.concatenate(kept)
         mine = order[starts[rank] : starts[rank + 1]]
-        dofs = (mine[:, None] * d + np.arange(d)).ravel()
         local = np.flatnonzero(slave_of[nodes] >= 0)
         chosen = of_contact[contact_starts[rank] : contact_starts[rank + 1]]
         here = of_entry[entry_starts[rank] : entry_starts[rank + 1]]
         own_slave = number[slave[here]] - starts[rank]
-        yield Share(
+        yield rank, Share(
             nodes, number[nodes], owner[nodes] == rank, starts, bodies, given.fixed[mine],
-            given.prescribed[mine], given.load[mine], given.modes[dofs],
+            given.prescribed[mine], given.load[mine], given.piece[mine], given.turning,
             local, contacts.frames[slave_of[nodes[local]]],
             contacts.at(chosen, number[contacts.node[chosen]] - starts[rank]),
             (own_slave * d + column[here] % d, number[row[here] // d] * d + row[here] % d,

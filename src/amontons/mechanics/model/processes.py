@@ -11,7 +11,6 @@ assembles and keeps its part, and together they run a semismooth Newton method
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -67,7 +66,6 @@ def distributed(
         trim()  # what the first one has needed for the whole mesh
         rows = [together(comm, lambda: _rows(share))]
         problem = _problem(share, rows, comm, linear or Petsc())
-        share = replace(share, modes=share.modes[:0].copy())  # the matrix has them
         trim()  # blocks of which PETSc has made its matrix
         found = SpreadActiveSet(problem).solve(float(tolerance))
         solution = DistributedSolution.of(share, problem, found, comm)
@@ -88,14 +86,14 @@ def _received(model: Model | Callable[[], Model], comm: Any) -> Share:
     found = together(comm, lambda: None if comm.rank else _made(model, comm.size))
     if found is None:
         return comm.recv(source=0)
-    mine = None
-    for rank, share in enumerate(shares(*found, comm.size)):
+    own = None
+    for rank, share in shares(*found, comm.size):
         if rank:
             comm.send(share, dest=rank)
         else:
-            mine = share
-    assert mine is not None
-    return mine
+            own = share
+    assert own is not None
+    return own
 
 
 def _made(model: Model | Callable[[], Model], processes: int) -> tuple[Whole, Index]:
@@ -187,7 +185,7 @@ def _problem(
     contact[dofs] = True
     matrix = SpreadMatrix(
         comm, rows.pop, _basis(share, comm.rank) if share.coupled else None,
-        modes=turned(share.modes), d=d, fixed=fixed, contact=contact, options=options,
+        modes=lambda: turned(share.modes), d=d, fixed=fixed, contact=contact, options=options,
     )  # fmt: skip
     y = matrix.to_basis(turned(share.prescribed.ravel()))
     y[~fixed] = 0.0

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from contextlib import suppress
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -16,6 +17,7 @@ Component = float | Callable[..., float] | None
 Vector = Sequence[float | None] | Array
 VectorValue = float | Sequence[Component] | Callable[..., Vector]
 ScalarValue = ArrayLike | Callable[[Array], ArrayLike]
+PLAIN = {float, int, np.float64}  # numbers of what most functions return
 
 
 def check_vector(value: object, what: str, *, free: bool = False) -> None:
@@ -91,8 +93,7 @@ def vector_at(
     dim = points.shape[1] if size is None else size
     value = steady_value(value)
     if callable(value):
-        rows = [_row(value(x), dim, what, free) for x in points]
-        return np.array(rows, dtype=float).reshape(len(points), dim)
+        return _table([value(x) for x in points], dim, what, free)
     columns = [_column(entry, points, what, free) for entry in _entries(value, dim, what)]
     return np.array(columns, dtype=float).T.reshape(len(points), dim)
 
@@ -161,6 +162,18 @@ def _entries(value: object, dim: int, what: str) -> list:
     if len(entries) != dim:
         raise InvalidInput(f"{what}: expected {dim} components, got {len(entries)}")
     return entries
+
+
+def _table(rows: list, dim: int, what: str, free: bool) -> Array:
+    """What a function returned as an array (n, dim); looked at one by one where need be."""
+    plain = all(type(row) in (tuple, list) and len(row) == dim for row in rows)
+    if plain and {type(entry) for row in rows for entry in row} <= PLAIN:
+        with suppress(OverflowError):
+            found = np.array(rows, dtype=float).reshape(len(rows), dim)
+            if (np.abs(found) <= LARGEST).all():
+                return found
+    found = [_row(row, dim, what, free) for row in rows]
+    return np.array(found, dtype=float).reshape(len(rows), dim)
 
 
 def _row(values: object, dim: int, what: str, free: bool) -> list[float]:

@@ -276,6 +276,7 @@ __all__ = [
     "Measure",
     "Weakest",
     "contact_residual",
+    "error_of_motion",
     "max_cone_violation",
     "max_penetration",
     "natural_error",

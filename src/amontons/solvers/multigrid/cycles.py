@@ -51,7 +51,7 @@ from numpy.typing import NDArray
 from ...core.arrays import read_only
 from ...core.errors import UnsupportedForm
 from ...core.options import check_options
-from ...linear.vectors import add_scaled, copy_into, dot, norm
+from ...linear.vectors import BESIDE, add_scaled, copy_into, dot, norms_of
 from ...problem.friction import Form, FrictionProblem
 from ..anderson import Anderson
 from ..contract import (
@@ -194,6 +194,8 @@ class _Run:
         self.level = levels.hierarchy.levels[k]
         self.held = np.zeros(self.level.A.nodes, dtype=bool)
         self.held[self.contacts.node] = True
+        self.kind = self.held.astype(np.int8)
+        self.kind[self.contacts.near.node] = BESIDE
         tangent.begin(k, self.contacts)
         self.parts = self.contacts.tangent()  # V, W, L at the present states
         self.states = np.full_like(self.contacts.state, -2)  # of the tangent
@@ -300,11 +302,8 @@ class _Run:
     def error(self, x: Array) -> float:
         """The measure of `judge` from the residual of x; reactions become those of x."""
         law = self.contacts.natural_map(x, self.r)
-        kept = self.r[self.contacts.node]
-        self.r[self.contacts.node] = 0.0
-        balance = norm(self.r)
-        self.calm = norm(self.r[self.contacts.near.node]) < LITTLE * balance
-        self.r[self.contacts.node] = kept
+        balance, near = norms_of(self.r, self.kind)
+        self.calm = near < LITTLE * balance
         return max(balance / self.load, law / self.length)
 
     def renew(self, frozen: bool) -> None:
