@@ -67,7 +67,8 @@ if TYPE_CHECKING:
 Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]
 FULL = 0.25  # part of a node, of that of its neighbours, from which on it bears for itself
-NOTHING = 1e-9  # of what would close the gap: a force that is none, beside tolerances
+NOTHING = 1e-9  # of the largest force: one that is none, beside tolerances
+RESOLVED = 1e-12  # of the force that would close a gap: what rounding leaves, where none bears
 
 
 @dataclass(frozen=True, eq=False)
@@ -294,7 +295,9 @@ class Mixture:
     @property
     def told_gap(self) -> Array:
         """g', (nc,), or g where that is more and no force is there: the law holds by either."""
-        bears = (self.normals * self.force).sum(axis=1) > NOTHING * self.rho * self.own_gap
+        along = (self.normals * self.force).sum(axis=1)
+        most = np.linalg.norm(self.force, axis=1).max(initial=0.0)
+        bears = along > np.maximum(NOTHING * most, RESOLVED * self.rho * self.own_gap)
         return np.where(bears, self.gap, np.maximum(self.gap, self.own_gap))
 
     @property
