@@ -245,3 +245,23 @@ def test_round_ends_slide_off_each_other_in_space():
     assert max(step.solution.convergence.linear_iterations for step in steps) <= 20
     up = [np.ravel(step.resultant())[2] for step in steps[2:]]
     assert (np.diff(up) < 0).all()
+
+
+def test_gaps_of_nodes_that_hardly_anything_faces_are_those_of_geometry():
+    """Below a die that rises ever steeper gaps grow; .004 was told of one .3 away."""
+    mesh = am.box((1.0, 1.0), (10, 4), origin=(-0.5, 0.0))
+    x, y = mesh.points.T
+    angle = 2 * np.arcsin(0.5 / 0.52) * x
+    curved = np.stack([0.52 * np.sin(angle), 0.52 * (1 - np.cos(angle))], axis=1)
+    own = np.stack([x * y, y], axis=1)
+    mesh = replace(mesh, points=own + (1 - y)[:, None] * curved)
+    slab = am.Body(am.box((2.0, 0.5), (16, 3), origin=(-0.93, -0.5)), NEO, name="slab")
+    model = am.Model([slab, am.Body(mesh, NEO, name="die")],
+                     [am.Fix("slab.bottom", 0), am.Fix("die.top", (0, -0.02))],
+                     [am.Contact("slab.top", master="die.bottom", mu=0.3)])  # fmt: skip
+    gap = am.solve(model).gap
+    assert (gap > -1e-12).all()
+    closed = np.flatnonzero(gap < 1e-9)
+    assert len(closed)
+    assert (np.diff(gap[: closed[0] + 1]) < 0).all()
+    assert (np.diff(gap[closed[-1] :]) > 0).all()

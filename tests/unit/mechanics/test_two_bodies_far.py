@@ -297,6 +297,18 @@ def test_sides_of_a_block_that_is_pressed_bear_nothing(swap):
     assert force[1] == pytest.approx(force[0], rel=3e-3)
 
 
+def test_little_force_on_a_side_beside_the_contact_is_not_left_out():
+    """4e-8 of all, beside a real one, of a sliver a gap away: the balance is told with it."""
+    below = am.Body(am.box((2, 1), (10, 3), origin=(-0.5, -1), kind="tri"), NEO, name="lower",
+                    order=2)  # fmt: skip
+    mesh = outlined(am.box((1, 1), (4, 3), kind="tri"))
+    held = [am.Fix("lower.bottom", 0), am.Fix("upper.top", (0, lambda x, t: -0.05 * t))]
+    model = am.Model([below, am.Body(mesh, NEO, name="upper", order=2)], held,
+                     contacts=[pair(("upper.outline", "lower.top"), 0.3)])  # fmt: skip
+    steps = am.evolve(model, am.QuasiStatic(0.25), until=0.5)
+    assert max(step.solution.convergence.error for step in steps) < 1e-8
+
+
 @pytest.mark.parametrize("swap", [False, True])
 @pytest.mark.parametrize("dim", [2, 3])
 def test_the_tangent_is_exact_where_sides_lean_over(dim, swap):

@@ -116,7 +116,7 @@ class CurrentContact:
         if play is not None:
             z = r[:, 1:] - own.rho[:, None] * u[:, 1:]
             u[:, 1:] += (1 - left(z, own.rho * play))[:, None] * z / own.rho[:, None]
-        u[:, 0] = meeting.gap if mixed is None else mixed.gap
+        u[:, 0] = meeting.gap if mixed is None else mixed.told_gap
         if drawn is not None:
             part = 1.0 if mixed is None else mixed.weights[:, None]
             u[:, 1:] += part * still_drawn(drawn, axes, self.free)

@@ -23,9 +23,10 @@ That is the law of g' and s' in the place of g and s, H = (lambda - D p) / rho,
     s' = w s + (1 - w) (H - C_T D p_T),    q' = w q,                                        (3)
 
 C_T and q of springs along the surface (`framed_point`), else zero, which `local` of `current`
-tells, so that statuses and errors are those of the law.  What slid while open, `closing`, is
-taken off z_T as (2) has it: for w = 0 off the mean force.  A bound that is a given stress says
-itself how much a node bears of what faces it: Tresca's law does not fade.
+tells, so that statuses and errors are those of the law; but g of who bears nothing and is open
+by g as well, as g' goes to zero with w however far away the master is.  What slid while open,
+`closing`, is taken off z_T as (2) has it: for w = 0 off the mean force.  A bound that is a
+given stress says itself how much a node bears of what faces it: Tresca's law does not fade.
 
 Whose neighbours have no row, or a sliver as well, compares with nobody: kappa is infinite, or
 1, and w is 1.  That its averages are extrapolations from a sliver the covered part itself says,
@@ -66,6 +67,8 @@ if TYPE_CHECKING:
 Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]
 FULL = 0.25  # part of a node, of that of its neighbours, from which on it bears for itself
+NOTHING = 1e-9  # of the largest force: one that is none, beside tolerances
+RESOLVED = 1e-12  # of the force that would close a gap: what rounding leaves, where none bears
 
 
 @dataclass(frozen=True, eq=False)
@@ -288,6 +291,14 @@ class Mixture:
         """g', (nc,)."""
         w = self.weights
         return np.where(w < 1, w * self.own_gap + (1 - w) * self._gap_of_share, self.own_gap)
+
+    @property
+    def told_gap(self) -> Array:
+        """g', (nc,), or g where that is more and no force is there: the law holds by either."""
+        along = (self.normals * self.force).sum(axis=1)
+        most = np.linalg.norm(self.force, axis=1).max(initial=0.0)
+        bears = along > np.maximum(NOTHING * most, RESOLVED * self.rho * self.own_gap)
+        return np.where(bears, self.gap, np.maximum(self.gap, self.own_gap))
 
     @property
     def motion(self) -> Array:
