@@ -20,9 +20,9 @@ much is no slip: z_T (1 - rho a / |z_T|), zero where negative, is in the place o
 (2) is zero where friction opposes what is left of the motion, s_T (1 - a / |s_T|), and none is
 up to there: the proximal map of mu N max(|s_T| - a, 0) in the place of that of mu N |s_T|.
 
-Components that supports prescribe are left out: lambda and s, with what springs were drawn by,
-count as zero there, the support takes them.  Orthotropic friction, and springs along the
-surface, are `framed_point`.
+Components that supports prescribe are left out of lambda: between bodies s, with what springs
+were drawn by, counts as zero there, with obstacles the law says lambda, which the support takes
+(`dragged`).  Orthotropic friction, and springs along the surface, are `framed_point`.
 
 [AC] P. Alart, A. Curnier, CMAME 92 (1991).
 [LR] T. Ligurský, Y. Renard, CMAME 280 (2014).
@@ -41,12 +41,14 @@ from ...problem.law import Law
 from ...problem.law.law import MU, TRESCA
 from ...problem.law.states import OPEN, SLIP, STICK
 from .closing import left, slope_of_left
-from .current_pairs import Meetings, Pair
+from .current_pairs import Meetings, ObstaclePair, Pair
+from .dragged import GIVE, dragged, without_held
 from .fading import Mixture
-from .pieces import BACK, Pieces, slides, tangents
+from .pieces import BACK, Pieces, friction_slopes, margins, slides, tangents, turned_slip
 from .surface_axes import still_drawn
 
 Array = NDArray[np.float64]
+Mask = NDArray[np.bool_]
 Partials = tuple[Array, Array, Array, Array, Array | None]
 
 
@@ -60,7 +62,13 @@ class CurrentContact:
     pairs: Sequence[Pair]
     law: Law
     rho: Array
-    free: NDArray[np.bool_]
+    free: Mask
+
+    @cached_property
+    def heard(self) -> Mask:
+        """Components of motions that the law hears, (nc, d): with obstacles all of them."""
+        known = [np.full(len(p.slaves), isinstance(p, ObstaclePair)) for p in self.pairs]
+        return self.free | np.concatenate(known)[:, None]
 
     def over(self, meeting: Meetings) -> CurrentContact:
         """The contact whose stresses act on the areas of a meeting, see `grown_areas`."""
@@ -108,8 +116,11 @@ class CurrentContact:
         were drawn at the end of the last step, in the frames, a part of the slip; play (nc,):
         a, which is none.
         """
-        own, axes = self.over(meeting), meeting.frames
-        force, motion = force * self.free, motion * self.free
+        own, axes, force = self.over(meeting), meeting.frames, force * self.free
+        motion = motion * self.heard
+        if (self.heard & ~self.free).any():
+            point = self.at(force, motion, meeting, drawn, play)
+            force, motion = point.force, motion + point.given_way
         mixed = meeting.mixture(own, force, motion, drawn)
         r = np.einsum("pkc,pc->pk", axes, force)
         u = np.einsum("pkc,pc->pk", axes, motion if mixed is None else mixed.motion)
@@ -119,7 +130,7 @@ class CurrentContact:
         u[:, 0] = meeting.gap if mixed is None else mixed.told_gap
         if drawn is not None:
             part = 1.0 if mixed is None else mixed.weights[:, None]
-            u[:, 1:] += part * still_drawn(drawn, axes, self.free)
+            u[:, 1:] += part * still_drawn(drawn, axes, self.heard)
         return r, u, axes
 
     def at(
@@ -127,23 +138,24 @@ class CurrentContact:
         play: Array | None = None,
     ) -> ContactPoint:  # fmt: skip
         """The law at forces lambda and motions s, both (nc, d), where the pairs meet."""
-        own, force, motion = self.over(meeting), force * self.free, motion * self.free
+        own, force, motion = self.over(meeting), force * self.free, motion * self.heard
         mixed = meeting.mixture(own, force, motion, drawn)
         if mixed is not None:
             motion = mixed.motion
         known = own, force, motion, meeting, mixed
         if not self.framed:
-            return ContactPoint(*known, play)
+            return dragged(ContactPoint(*known, play))
         from .framed_point import FramedPoint  # which is a ContactPoint
 
-        return FramedPoint(*known, None, drawn)
+        return dragged(FramedPoint(*known, drawn=drawn))
 
 
 @dataclass(frozen=True, eq=False)
 class ContactPoint:
     """Where (2) is evaluated; arrays are made when they are asked for.
 
-    motion (nc, d): s, or what `mixed` has in its place; play (nc,): a.
+    motion (nc, d): s, or what `mixed` has in its place; play (nc,): a; held (nc, d): H of
+    `dragged`, whose forces are the law's, None for none.
     """
 
     contact: CurrentContact
@@ -152,6 +164,7 @@ class ContactPoint:
     meeting: Meetings
     mixed: Mixture | None = None
     play: Array | None = None
+    held: Mask | None = None
 
     @property
     def gap(self) -> Array:
@@ -174,7 +187,7 @@ class ContactPoint:
         return 1.0 - self.contact.rho * self.contact.give[:, 0]
 
     @property
-    def tied(self) -> NDArray[np.bool_]:
+    def tied(self) -> Mask:
         """Contacts that neither part nor slip, (nc,): their law is rho (s + C lambda)."""
         return self.contact.law.tied
 
@@ -195,10 +208,26 @@ class ContactPoint:
         given = self.motion + np.einsum("pij,pj->pi", self._gives, self.force)
         return np.where(self.tied[:, None], self.contact.rho[:, None] * given, out)
 
+    @property
+    def slip(self) -> Array:
+        """What friction speaks of, (nc, d): s."""
+        return self.motion
+
+    @cached_property
+    def counted(self) -> Array:
+        """Parts of lambda in z_T, (nc, d): 1 but for what `dragged` has."""
+        held = np.zeros(self.n.shape, dtype=bool) if self.held is None else self.held
+        return np.where(held, 1.0 - GIVE, 1.0)
+
+    @property
+    def given_way(self) -> Array:
+        """What is no slip of s, (nc, d): how far springs of `dragged` are drawn."""
+        return (1.0 - self.counted) * self.force / self.contact.rho[:, None]
+
     @cached_property
     def y(self) -> Array:
         """lambda - rho s, (nc, d)."""
-        return self.force - self.contact.rho[:, None] * self.motion
+        return self.counted * self.force - self.contact.rho[:, None] * self.motion
 
     @cached_property
     def y_normal(self) -> Array:
@@ -231,14 +260,14 @@ class ContactPoint:
         """Largest friction force, (nc,)."""
         return self._bound(self.z_normal > 0)
 
-    def _bound(self, closed: NDArray[np.bool_]) -> Array:
+    def _bound(self, closed: Mask) -> Array:
         law, z = self.contact.law.plain, np.where(closed, self.z_normal, 0.0)
         mu, bound = law.parameters.T
         bound = np.where(self.tied, 0.0, bound)  # infinite, of no use here
         return np.where(law.given(z[:, None]), bound, mu * z) * self.meeting.met
 
     @property
-    def _without(self) -> NDArray[np.bool_]:
+    def _without(self) -> Mask:
         """Contacts without friction, (nc,), that are not under Tresca's law."""
         law = self.contact.law
         return (law.parameters[:, MU] == 0) & (law.kind != TRESCA)
@@ -296,24 +325,10 @@ class ContactPoint:
         return self._with_ties(self.force - normal - self._released(slip + stuck))
 
     def margins(self, pieces: Pieces) -> Array:
-        """Distances to the borders of given pieces, (nc, 3): all positive inside of them.
-
-        Contacts without friction slip: no point is inside of their other closed pieces.
-        """
-        closed = (pieces > 0) & (pieces < 4)
-        z = np.where(closed, self.z_normal, -self.z_normal)
-        bound, kind = self._bound(closed), pieces % 4
-        far = np.full(len(z), np.inf)
-        borders = [bound - self.along, self.along - bound, -self.along - bound]
-        ahead = np.select([kind == STICK, kind == SLIP, kind == BACK], borders, far)
-        behind = np.where(kind == STICK, bound + self.along, far)
-        without = self._without
-        other = without & ((kind == STICK) | (kind == BACK))  # pieces they do not have
-        ahead[without], behind[without] = np.inf, np.inf
-        ahead[other] = -np.inf
-        out = np.stack([z, ahead, behind], axis=1)
-        out[self.tied] = np.inf
-        return out
+        """Distances to the borders of given pieces, (nc, 3), see `pieces`."""
+        bound = self._bound((pieces > 0) & (pieces < 4))
+        out = margins(pieces, self.z_normal, self.along, bound, self._without)
+        return np.where(self.tied[:, None], np.inf, out)
 
     def derivatives(self, pieces: Pieces | None = None) -> tuple[Array, Array, Array]:
         """Derivatives of (2) by lambda, x and s, each (nc, d, d), on some (the active) pieces.
@@ -327,6 +342,13 @@ class ContactPoint:
 
     def partials(self, pieces: Pieces | None = None) -> Partials:
         """Derivatives of (2) by lambda, n, g (nc, d), s and E; the others (nc, d, d).
+
+        Of what is free of lambda and heard of s.
+        """
+        return without_held(self, pieces)
+
+    def of_all(self, pieces: Pieces | None = None) -> Partials:
+        """The same of all components as if none were held.
 
         E, of `surface_axes`, of which this law does not know: None.
         """
@@ -344,19 +366,18 @@ class ContactPoint:
         in_bound = in_bound * (slope * closed)[:, None]
         normal = closed[:, None] * n + in_bound  # of the force, per z_N
         pressed = self._stiffness_left[:, None, None] * normal[:, :, None]
-        by_force = eye - pressed * n[:, None, :] - in_z @ tangential
+        by_force = eye - pressed * n[:, None, :] - in_z @ tangential * self.counted[:, None, :]
         # z_T by n at fixed y
         turned = -eye * self.y_normal[:, None, None] - n[:, :, None] * self.y[:, None, :]
         by_normal = -pressed * self.force[:, None, :] - in_z @ turned
         by_normal -= (closed * self.z_normal - self.cohesion)[:, None, None] * eye
         if d == 2:
-            by_normal -= self._turned_slip(pieces)
+            by_normal -= turned_slip(pieces % 4, n, self._bound(closed > 0))
         by_gap = normal * self.contact.rho[:, None]
         by_motion = rho * (in_z @ tangential)
         if self.tied.any():
             self._tie_inplace(by_force, by_normal, by_gap, by_motion)
-        free = self.contact.free[:, None, :]
-        return by_force * free, by_normal, by_gap, by_motion * free, None
+        return by_force, by_normal, by_gap, by_motion, None
 
     def _tie_inplace(
         self, by_force: Array, by_normal: Array, by_gap: Array, by_motion: Array
@@ -375,22 +396,5 @@ class ContactPoint:
 
     def _friction(self, pieces: Pieces) -> tuple[Array, Array]:
         """Derivatives of P by z_T, (nc, d, d), and by the bound, (nc, d)."""
-        d, kind = self.n.shape[1], pieces % 4
-        in_z = np.where((kind == STICK)[:, None, None], np.eye(d), 0.0)
-        slip = slides(kind)
-        if d == 2:
-            sign = np.where(kind == SLIP, 1.0, -1.0)
-            return in_z, np.where(slip, sign, 0.0)[:, None] * tangents(self.n)
-        length = np.where(self.along > 0, self.along, 1.0)
-        s = self.z_tangent / length[:, None]
         bound = self._bound((pieces > 0) & (pieces < 4))
-        turning = (bound / length)[:, None, None] * (np.eye(d) - s[:, :, None] * s[:, None, :])
-        in_z = np.where(slip[:, None, None], turning, in_z)
-        return in_z, np.where(slip[:, None], s, 0.0)
-
-    def _turned_slip(self, pieces: Pieces) -> Array:
-        """2D: the derivative of +-t by n at a fixed bound, (nc, 2, 2): dt = -n (t . dn)."""
-        kind = pieces % 4
-        sign = np.select([kind == SLIP, kind == BACK], [1.0, -1.0], 0.0)
-        size = sign * self._bound((pieces > 0) & (pieces < 4))
-        return -size[:, None, None] * self.n[:, :, None] * tangents(self.n)[:, None, :]
+        return friction_slopes(pieces % 4, self.n, self.z_tangent, self.along, bound)

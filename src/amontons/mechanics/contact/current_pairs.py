@@ -265,7 +265,7 @@ class Meetings:
                 weights[mine], theta[mine] = fading.weights, fading.theta
                 passed[mine] = fading.shares @ force[mine]
         if drawn is not None:
-            drawn = np.einsum("pk,pkc->pc", drawn, self.frames[:, 1:]) * contact.free
+            drawn = np.einsum("pk,pkc->pc", drawn, self.frames[:, 1:]) * contact.heard
         return Mixture(weights, theta, passed, contact.rho, contact.give, contact.law.offset,
                        contact.free, force, motion, self.gap, self.normals, drawn)  # fmt: skip
 

@@ -76,23 +76,23 @@ class FramedPoint(ContactPoint):
         return out if self.mixed is None else self.mixed.weights[:, None] * out
 
     @cached_property
-    def _slip(self) -> Array:
-        """s + q, (nc, d), without components that supports hold."""
+    def slip(self) -> Array:  # type: ignore[override]  # kept
+        """s + q, (nc, d), of components that are heard."""
         pulled = self._pulled
-        return self.motion if pulled is None else self.motion + pulled * self.contact.free
+        return self.motion if pulled is None else self.motion + pulled * self.contact.heard
 
     @cached_property
     def z_tangent(self) -> Array:
         """z_T, (nc, d), in global axes."""
         _, by_force, by_motion = self._tensors
-        out = np.einsum("pij,pj->pi", by_force, self.force)
-        return out + np.einsum("pij,pj->pi", by_motion, self._slip)
+        out = np.einsum("pij,pj->pi", by_force, self.counted * self.force)
+        return out + np.einsum("pij,pj->pi", by_motion, self.slip)
 
     def _released(self, friction: Array) -> Array:
         """T P, (nc, d)."""
         return np.einsum("pij,pj->pi", self._tensors[0], friction)
 
-    def partials(self, pieces: Pieces | None = None) -> Partials:
+    def of_all(self, pieces: Pieces | None = None) -> Partials:
         """Derivatives of (2) by lambda, n, g (nc, d), s (nc, d, d), and E (nc, d, 2 d)."""
         pieces = self.pieces if pieces is None else pieces
         n = self.n
@@ -105,22 +105,22 @@ class FramedPoint(ContactPoint):
         normal = closed[:, None] * n + in_bound  # of the force, per z_N
         pressed = self._stiffness_left[:, None, None] * normal[:, :, None]
         in_z = stretch @ in_z
+        squeezed = squeezed * self.counted[:, None, :]
         by_force = np.eye(n.shape[1]) - pressed * n[:, None, :] - in_z @ squeezed
         by_gap = normal * self.contact.rho[:, None]
         by_motion = -in_z @ moved
         if self.tied.any():
             self._tie_inplace(by_force, np.zeros_like(by_force), by_gap, by_motion)
         by_normal, by_axis = self._spun(by_force, by_motion, self.residual(pieces))
-        free = self.contact.free[:, None, :]
-        return by_force * free, by_normal, by_gap, by_motion * free, by_axis
+        return by_force, by_normal, by_gap, by_motion, by_axis
 
     def _spun(self, by_force: Array, by_motion: Array, law: Array) -> tuple[Array, Array]:
         """What (3) has of the spin, by n (nc, d, d) and by E (nc, d, 2 d)."""
         n, d = self.n, self.n.shape[1]
         by_spin = by_force @ _cross(self.force) + by_motion @ _cross(self.motion) - _cross(law)
-        if self._pulled is not None and not (free := self.contact.free).all():
-            turned = free[:, :, None] * _cross(self._pulled)  # what is held does not turn
-            by_spin += by_motion @ (_cross(self._pulled * free) - turned)
+        if self._pulled is not None and not (heard := self.contact.heard).all():
+            turned = heard[:, :, None] * _cross(self._pulled)  # what is held does not turn
+            by_spin += by_motion @ (_cross(self._pulled * heard) - turned)
         if d == 2:
             return -by_spin * self.meeting.frames[:, 1, None, :], np.zeros((len(n), 2, 0))
         by_normal, by_axis = twist(n, self.meeting.along, self.meeting.frames)

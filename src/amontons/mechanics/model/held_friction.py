@@ -1,9 +1,10 @@
-"""A doubt about contact where nodes are: supports hold sliding contacts along the surface.
+"""A doubt about bodies that slide far: supports hold sliding contacts along the surface.
 
-Along components that supports prescribe a contact of finite kinematics has no friction
-(`contact.current`): what it would be is part of a reaction that nobody knows, so that neither
-the slave nor its master get it.  Small kinematics has it there.  Nothing is missing where the
-sides do not move on each other, as in planes of symmetry.
+Along components that supports prescribe a contact of two bodies has no friction with finite
+kinematics (`contact.current`): what it would be is part of a reaction that nobody knows, so
+that neither the slave nor its master get it.  Small kinematics has it there, and obstacles
+(`contact.dragged`).  Nothing is missing where the sides do not move on each other, as in planes
+of symmetry.
 """
 
 from __future__ import annotations
@@ -29,7 +30,7 @@ def held_friction(model: Model, fields: ContactFields) -> list[ResultWarning]:
     """Pairs whose friction is notably less for want of that along held components."""
     displacement = np.concatenate(fields.displacement)
     contact = nonlinear_parts(model).contact
-    if contact.free.all() or not np.isfinite(displacement).all():
+    if contact.heard.all() or not np.isfinite(displacement).all():
         return []
     missing, bound = _missing(model, fields, displacement)
     out, start = [], 0
@@ -58,18 +59,17 @@ def _missing(model: Model, fields: ContactFields, displacement: Array) -> tuple[
     motion = meeting.relative(displacement)
     normal = fields.frames[:, 0]
     along = motion - (motion * normal).sum(axis=1)[:, None] * normal
-    held = np.linalg.norm(np.where(contact.free, 0.0, along), axis=1)
+    held = np.linalg.norm(np.where(contact.heard, 0.0, along), axis=1)
     return np.minimum(bound, contact.rho * held), bound
 
 
 def _warning(model: Model, k: int, count: int, part: float, at: Array) -> ResultWarning:
     contact = model.contacts[k]
-    other = "" if contact.master is None else f" with {contact.master!r}"
-    cure = "" if contact.master is None else ", or take the other surface as the slave"
+    where = ", ".join(f"{c:.6g}" for c in at)
     return ResultWarning(
         "held-without-friction",
-        f"contact on {contact.slave!r}{other}: supports hold {count} of its contacts along the "
-        f"surface on which they slide, as at [{', '.join(f'{c:.6g}' for c in at)}]; these have "
-        f"no friction with kinematics 'finite', and about {100 * part:.2g} % of what "
-        f"friction bears is missing; hold the body elsewhere{cure}",
+        f"contact on {contact.slave!r} with {contact.master!r}: supports hold {count} of its "
+        f"contacts along the surface on which they slide, as at [{where}]; these have no "
+        f"friction with kinematics 'finite', and about {100 * part:.2g} % of what friction "
+        "bears is missing; hold the body elsewhere, or take the other surface as the slave",
     )

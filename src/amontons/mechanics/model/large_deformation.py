@@ -11,7 +11,8 @@ which is continuous and piecewise smooth; all its entries are forces.  Friction 
 motion since `before`, the displacements at the end of the last step: [LR] section 3.
 With two bodies that deform (1) has the forces of contacts on other nodes, see `moved_pairs`.
 `linearised`, the tangent problem at a state, is all that statuses, files and pictures need.
-Left out: friction on components of a contact's motion that supports hold.
+Friction on components that supports hold is that of `contact.dragged` on obstacles; left out
+between bodies.
 
 [LR] T. Ligurský, Y. Renard, "A continuation problem for computing solutions of discretised
 evolution problems with application to plane quasi-static contact problems with friction",

@@ -62,10 +62,9 @@ class Linearisation:
         """First-order change of F, (n,), with changes of load, prescribed (dofs,) and drift."""
         parts = self.parts
         change = parts.matrix(self.blocks) @ prescribed - NodalForces.of(load).at(self.u)
-        out = self.passed(change)
-        if drift is not None:
-            out += self.with_law(np.einsum("pij,pj->pi", self.by_motion, drift))
-        return out
+        moved = prescribed[parts.at] + (0.0 if drift is None else drift)
+        slid = np.einsum("pij,pj->pi", self.by_motion, moved)
+        return self.passed(change) + self.with_law(slid)
 
     @property
     def structure(self) -> Structure:

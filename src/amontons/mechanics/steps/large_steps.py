@@ -17,6 +17,7 @@ from ...problem.law.law import MU
 from ...problem.solution import FrictionSolution
 from ..contact.closing import slid_while_open
 from ..contact.current_mortar import MortarMeeting
+from ..contact.dragged import before
 from ..contact.surface_axes import still_drawn
 from ..model import Model
 from ..model.diagnosis import with_diagnosis
@@ -69,6 +70,8 @@ class LargeSlowModel:
         body = body.divided(q0) if nonlinear_parts(body).folds else body
         drawn = self._drawn(body, state)
         problem = large_step(body, load, prescribed, q0, self._known(state), drawn)
+        force = np.einsum("pk,pkc->pc", state.force, problem.earlier.frames)
+        problem = replace(problem, drift=problem.drift + before(problem.parts.contact, force))
         if self.crossing is None:  # a kink beyond those that paths know
             problem = replace(problem, play=slid_open(problem, state, time - state.time))
         if isinstance(problem.law, VaryingFriction):  # of the speed in this step
@@ -86,7 +89,7 @@ class LargeSlowModel:
         axes = meeting.frames
         force = np.einsum("pkc,pk->pc", axes, solution.r)
         if drawn is not None:
-            drawn = still_drawn(drawn, axes, problem.parts.contact.free)
+            drawn = still_drawn(drawn, axes, problem.parts.contact.heard)
         tied = body.law.tied[:, None]  # what bonds give way is no slip
         way = slid = solution.u[:, 1:]
         if drawn is not None:
