@@ -8,6 +8,7 @@ import numpy as np
 from numba import uint64
 
 from ..core.compiled import njit
+from .block_products import product_of_blocks
 
 WELL_CONDITIONED = 1e-6  # |det A| / max|A|^3 from which A^-1 loses no digits that matter
 TURNS = 12  # of Jacobi's method at most; three or four do
@@ -61,14 +62,9 @@ def velocity_of_rows_inplace(begin, end, indptr, indices, rows, q, r, u):  # noq
             u[i, 0], u[i, 1], u[i, 2] = q[i, 0] + u0, q[i, 1] + u1, q[i, 2] + u2
         return
     for i in range(begin, end):
-        u0, u1, u2 = q[i, 0], q[i, 1], q[i, 2]
-        for k in range(uint64(indptr[i]), uint64(indptr[i + 1])):
-            j = uint64(indices[k])  # unsigned: no test for negative indices in the loop
-            r0, r1, r2 = r[j, 0], r[j, 1], r[j, 2]
-            u0 += rows[k, 0, 0] * r0 + rows[k, 0, 1] * r1 + rows[k, 0, 2] * r2
-            u1 += rows[k, 1, 0] * r0 + rows[k, 1, 1] * r1 + rows[k, 1, 2] * r2
-            u2 += rows[k, 2, 0] * r0 + rows[k, 2, 1] * r1 + rows[k, 2, 2] * r2
-        u[i, 0], u[i, 1], u[i, 2] = u0, u1, u2
+        first, last = uint64(indptr[i]), uint64(indptr[i + 1])
+        u0, u1, u2 = product_of_blocks(rows, indices, r, first, last, last)
+        u[i, 0], u[i, 1], u[i, 2] = q[i, 0] + u0, q[i, 1] + u1, q[i, 2] + u2
 
 
 @njit(cache=True, error_model="numpy")

@@ -31,6 +31,7 @@ from .states import OPEN, SLIP, STICK
 
 NEWTON_STEPS = 12
 NEAR_STEPS = 8  # from the last direction of a sweep, before the careful search
+NEAR = 1e-5  # step of that direction after which it is taken: its error is about the square
 ANGLES = 16  # intervals of the circle searched when Newton fails: roots are at most four
 PROJECTIONS = 500  # of the last resort
 BISECTIONS = 55  # of such an interval: to the last bit
@@ -198,26 +199,27 @@ def _slip_near(e, W, i, k, b0, b1, b2, mu, g1, g2):  # noqa: PLR0913
     p1, p2 = a * y1, a * y2
     q11, q12 = load * e[i, 12] - d1 * y1, load * e[i, 13] - d2 * y1
     q21, q22 = load * e[i, 14] - d1 * y2, load * e[i, 15] - d2 * y2
-    size = a * (abs(b1) + abs(b2)) - b0 * (abs(W[k, 1, 0]) + abs(W[k, 2, 0]))
-    size += abs(d1 * b1) + abs(d2 * b2) - load * (abs(e[i, 12]) + abs(e[i, 15]))
     c, s = -g1 / length, -g2 / length
     for _ in range(NEAR_STEPS):
         v1 = p1 + q11 * c + q12 * s
         v2 = p2 + q21 * c + q22 * s
         g = c * v2 - s * v1
         along = c * v1 + s * v2
-        if abs(g) <= 1e-15 * size:
-            coupling = a - d1 * c - d2 * s
-            if along < 0.0 or coupling <= ROUNDING * (a + abs(d1) + abs(d2)):
-                break
-            r = -b0 / coupling
-            return True, r, -mu * r * c, -mu * r * s
         slope = s * s * q11 - s * c * (q12 + q21) + c * c * q22 - along
         if not slope < 0.0 or abs(g) > -slope:
             break
         step = -g / slope
-        turn = 1.0 / math.sqrt(1.0 + step * step)
+        if abs(step) > NEAR:
+            turn = 1.0 / math.sqrt(1.0 + step * step)
+            c, s = (c - s * step) * turn, (s + c * step) * turn
+            continue
+        turn = 1.0 - 0.5 * step * step
         c, s = (c - s * step) * turn, (s + c * step) * turn
+        coupling = a - d1 * c - d2 * s
+        if along < 0.0 or coupling <= ROUNDING * (a + abs(d1) + abs(d2)):
+            break
+        r = -b0 / coupling
+        return True, r, -mu * r * c, -mu * r * s
     return False, 0.0, 0.0, 0.0
 
 

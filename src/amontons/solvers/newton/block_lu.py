@@ -12,10 +12,12 @@ from functools import cached_property
 from typing import Any
 
 import numpy as np
+from numba import uint64
 from numpy.typing import NDArray
 
 from ...core.compiled import njit
 from ...core.copies import copy_inplace
+from ...linear.block_products import product_of_blocks, subtract_products_inplace
 from ...problem.friction import FrictionProblem
 
 Index = NDArray[np.int32]
@@ -249,46 +251,37 @@ def factorise_inplace(  # noqa: PLR0913
     place = np.empty(n, dtype=np.int32)
     for p in range(n):
         place[order[p]] = p
-    for p in range(n):
+    for p in range(n):  # no views of blocks: their references would be counted in the loops
         i = order[p]
         for k in range(indptr[i], indptr[i + 1]):
-            target = work[place[indices[k]]]
-            source = data[k]
+            t = place[indices[k]]
             for a in range(3):
                 for b in range(3):
-                    target[a, b] = source[a, b]
-        pivot = work[p]
+                    work[t, a, b] = data[k, a, b]
         for a in range(3):
             for b in range(3):
-                pivot[a, b] += extra[i, a, b]
+                work[p, a, b] += extra[i, a, b]
         for k in range(lower_start[p], lower_start[p + 1]):
             c = lower[k]
-            w, inv, l = work[c], inverse[c], L[k]
             for a in range(3):
-                w0, w1, w2 = w[a, 0], w[a, 1], w[a, 2]
+                w0, w1, w2 = work[c, a, 0], work[c, a, 1], work[c, a, 2]
                 for b in range(3):
-                    l[a, b] = w0 * inv[0, b] + w1 * inv[1, b] + w2 * inv[2, b]
-                    w[a, b] = 0.0
-            l00, l01, l02 = l[0, 0], l[0, 1], l[0, 2]
-            l10, l11, l12 = l[1, 0], l[1, 1], l[1, 2]
-            l20, l21, l22 = l[2, 0], l[2, 1], l[2, 2]
-            for j in range(upper_start[c], upper_start[c + 1]):
-                t = upper[j]
-                for b in range(3):  # nine scalars of L stay in registers: the hot loop
-                    u0, u1, u2 = U[j, 0, b], U[j, 1, b], U[j, 2, b]
-                    work[t, 0, b] -= l00 * u0 + l01 * u1 + l02 * u2
-                    work[t, 1, b] -= l10 * u0 + l11 * u1 + l12 * u2
-                    work[t, 2, b] -= l20 * u0 + l21 * u1 + l22 * u2
-        regular = _invert3(pivot, inverse[p])
+                    L[k, a, b] = (
+                        w0 * inverse[c, 0, b] + w1 * inverse[c, 1, b] + w2 * inverse[c, 2, b]
+                    )
+                    work[c, a, b] = 0.0
+            first, last = uint64(upper_start[c]), uint64(upper_start[c + 1])
+            subtract_products_inplace(work, upper, U, L, uint64(k), first, last)
+        regular = _invert3(work[p], inverse[p])
         for a in range(3):
             for b in range(3):
-                pivot[a, b] = 0.0
+                work[p, a, b] = 0.0
         for j in range(upper_start[p], upper_start[p + 1]):
-            w, u = work[upper[j]], U[j]
+            t = upper[j]
             for a in range(3):
                 for b in range(3):
-                    u[a, b] = w[a, b]
-                    w[a, b] = 0.0
+                    U[j, a, b] = work[t, a, b]
+                    work[t, a, b] = 0.0
         if not regular:
             return False
     return True
@@ -300,27 +293,15 @@ def solve_inplace(order, upper_start, upper, lower_start, lower, U, L, inverse, 
     n = len(order)
     y = np.empty((n, 3))
     for p in range(n):
-        i = order[p]
-        y0, y1, y2 = b[i, 0], b[i, 1], b[i, 2]
-        for k in range(lower_start[p], lower_start[p + 1]):
-            c, l = lower[k], L[k]
-            z0, z1, z2 = y[c, 0], y[c, 1], y[c, 2]
-            y0 -= l[0, 0] * z0 + l[0, 1] * z1 + l[0, 2] * z2
-            y1 -= l[1, 0] * z0 + l[1, 1] * z1 + l[1, 2] * z2
-            y2 -= l[2, 0] * z0 + l[2, 1] * z1 + l[2, 2] * z2
-        y[p, 0], y[p, 1], y[p, 2] = y0, y1, y2
+        i, first, last = order[p], uint64(lower_start[p]), uint64(lower_start[p + 1])
+        y0, y1, y2 = product_of_blocks(L, lower, y, first, last, last)
+        y[p, 0], y[p, 1], y[p, 2] = b[i, 0] - y0, b[i, 1] - y1, b[i, 2] - y2
     for p in range(n - 1, -1, -1):
-        y0, y1, y2 = y[p, 0], y[p, 1], y[p, 2]
-        for k in range(upper_start[p], upper_start[p + 1]):
-            c, u = upper[k], U[k]
-            z0, z1, z2 = y[c, 0], y[c, 1], y[c, 2]
-            y0 -= u[0, 0] * z0 + u[0, 1] * z1 + u[0, 2] * z2
-            y1 -= u[1, 0] * z0 + u[1, 1] * z1 + u[1, 2] * z2
-            y2 -= u[2, 0] * z0 + u[2, 1] * z1 + u[2, 2] * z2
-        inv = inverse[p]
-        y[p, 0] = inv[0, 0] * y0 + inv[0, 1] * y1 + inv[0, 2] * y2
-        y[p, 1] = inv[1, 0] * y0 + inv[1, 1] * y1 + inv[1, 2] * y2
-        y[p, 2] = inv[2, 0] * y0 + inv[2, 1] * y1 + inv[2, 2] * y2
+        first, last = uint64(upper_start[p]), uint64(upper_start[p + 1])
+        y0, y1, y2 = product_of_blocks(U, upper, y, first, last, last)
+        y0, y1, y2 = y[p, 0] - y0, y[p, 1] - y1, y[p, 2] - y2
+        for a in range(3):
+            y[p, a] = inverse[p, a, 0] * y0 + inverse[p, a, 1] * y1 + inverse[p, a, 2] * y2
     for p in range(n):
         i = order[p]
         x[i, 0], x[i, 1], x[i, 2] = y[p, 0], y[p, 1], y[p, 2]

@@ -33,6 +33,7 @@ from numpy.typing import NDArray
 from ...core.compiled import njit
 from ...core.copies import copy_rows_inplace
 from ...linear.block_kernels import full_product
+from ...linear.block_products import product_of_blocks
 from ...problem.equations import JUDGE_FLOPS
 from ...problem.friction import FrictionProblem
 from ...problem.judge.measures import natural_error
@@ -169,14 +170,10 @@ def visit_inplace(s, first, last, backward, r):
             b1 += u1 - (W[own, 1, 0] * r0 + W[own, 1, 1] * r1 + W[own, 1, 2] * r2)
             b2 += u2 - (W[own, 2, 0] * r0 + W[own, 2, 1] * r1 + W[own, 2, 2] * r2)
         else:
-            for k in range(uint64(s.indptr[i]), uint64(s.indptr[i + uint64(1)])):
-                j = uint64(s.indices[k])  # unsigned: no test for negative indices in the loop
-                if j == i:
-                    continue
-                x0, x1, x2 = r[j, 0], r[j, 1], r[j, 2]
-                b0 += s.data[k, 0, 0] * x0 + s.data[k, 0, 1] * x1 + s.data[k, 0, 2] * x2
-                b1 += s.data[k, 1, 0] * x0 + s.data[k, 1, 1] * x1 + s.data[k, 1, 2] * x2
-                b2 += s.data[k, 2, 0] * x0 + s.data[k, 2, 1] * x1 + s.data[k, 2, 2] * x2
+            u0, u1, u2 = product_of_blocks(
+                W, s.indices, r, uint64(s.indptr[i]), uint64(s.indptr[i + uint64(1)]), own
+            )
+            b0, b1, b2 = b0 + u0, b1 + u1, b2 + u2
         if s.local == EXACT:
             if s.kind[i] == COULOMB:
                 x0, x1, x2 = solve_eliminated(
