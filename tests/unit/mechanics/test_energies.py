@@ -241,6 +241,23 @@ def test_what_is_wrong_with_an_energy_is_named(changed, message):
         own(**changed)
 
 
+def test_an_energy_may_write_into_what_it_gets():
+    def volume_of(J):
+        J -= 1
+        return 15 * J**2, 30 * J, np.full_like(J, 30.0)
+
+    def energy(C):
+        w = np.trace(C, axis1=1, axis2=2) - 3 - np.log(np.linalg.det(C))
+        C[:] = 0.0
+        return w
+
+    mesh = mesh_of("hex", "auto")
+    laws = own(), own(energy=energy, volume_of=volume_of)
+    bodies = [HyperelasticBody(mesh, law) for law in laws]
+    u = deformed(mesh)
+    np.testing.assert_array_equal(bodies[1].forces(u), bodies[0].forces(u))
+
+
 def test_an_energy_that_ends_somewhere_keeps_the_last_good_state():
     """Chains that are stretched out: no number beyond tr C = 3.06."""
     most = 0.06

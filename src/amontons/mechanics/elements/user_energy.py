@@ -79,7 +79,7 @@ class UserEnergy(PointLaw):
         assert self.volume_of is not None
         flat = np.ascontiguousarray(J, dtype=float).ravel()
         with np.errstate(all="ignore"):
-            found = tuple(self.volume_of(flat))
+            found = tuple(self.volume_of(flat.copy()))  # may write into what it gets
         if len(found) != 3:
             raise InvalidInput(f"{self.name}: volume: expected U, U' and U'', got {len(found)}")
         U, slope, bend = (
@@ -92,7 +92,8 @@ class UserEnergy(PointLaw):
         C = np.ascontiguousarray(C, dtype=float)
         n = len(C)
         with np.errstate(all="ignore"):
-            found = self.energy(C), self.stress_of(C), self.moduli_of(C)
+            asked = self.energy, self.stress_of, self.moduli_of
+            found = tuple(each(C.copy()) for each in asked)  # may write into what it gets
         shapes = (n,), (n, 3, 3), (n, 3, 3, 3, 3)
         names = "energy", "stress", "moduli"
         W, S, D = (

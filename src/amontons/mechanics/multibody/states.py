@@ -15,7 +15,7 @@ from ...problem.solution import FrictionSolution
 from .bodies import RigidBodies
 from .meeting import Meetings
 from .quick import Found
-from .rows import rotations, to_own, turned
+from .rows import rotations, to_global, to_own, turned
 
 Array = NDArray[np.float64]
 Index = NDArray[np.int64]
@@ -136,6 +136,16 @@ class RigidStep:
     def rotation(self) -> Array:
         """Rotations from own to global axes, (n, 3, 3)."""
         return rotations(self.state.motion.orientation)
+
+    @property
+    def velocity(self) -> Array:
+        """Of the centres of mass, (n, 3)."""
+        return self.state.motion.velocity
+
+    @property
+    def spin(self) -> Array:
+        """Angular velocities in global axes, (n, 3); those of the state are in own axes."""
+        return to_global(self.rotation, self.state.motion.spin)
 
     @cached_property
     def solution(self) -> FrictionSolution | None:
