@@ -78,7 +78,7 @@ FEW = 0.01  # share of the closed contacts up to which changed states leave the 
 GRID_DEPTH = 2  # past cycles to mix at most where M is not stored
 STALE = 0.5  # fall of the error in a cycle above which any changed state renews the tangent
 SLOW = 0.8  # fall of the error in a cycle above which, while states change, steps are limited
-LITTLE = 0.25  # share of |residual| in the rows that contacts touch: below it these solve once
+LITTLE = 0.5  # share of |residual| in the rows that contacts touch: below it these solve once
 CLOSE = 0.99  # share of the error that should do at which an iterate is handed out
 
 
@@ -261,8 +261,9 @@ class _Run:
         return self.changed() <= FEW * closed
 
     def smooth(self, x: Array, backward: bool) -> None:
-        """One sweep in the bulk."""
-        self.level.A.smooth(self.f, x, self.held, backward)
+        """One sweep in the bulk; nodes that contacts touch are visited with these (`relax`)."""
+        A = self.contacts.bulk or self.level.A
+        A.smooth(self.f, x, self.held, backward)
 
     def accelerate(self, x: Array, error: float, mixing: LeastResidual) -> float:
         """x as the best of the last points, with its law kept; its error.
@@ -300,11 +301,8 @@ class _Run:
     def error(self, x: Array) -> float:
         """The measure of `judge` from the residual of x; reactions become those of x."""
         law = self.contacts.natural_map(x, self.r)
-        kept = self.r[self.contacts.node]
-        self.r[self.contacts.node] = 0.0
-        balance = norm(self.r)
-        self.calm = norm(self.r[self.contacts.near.node]) < LITTLE * balance
-        self.r[self.contacts.node] = kept
+        near, balance = self.contacts.balance(self.r)
+        self.calm = near < LITTLE * balance
         return max(balance / self.load, law / self.length)
 
     def renew(self, frozen: bool) -> None:

@@ -40,7 +40,9 @@ from ...core.threads import Range, over_rows, over_stages
 from ...linear.chunks import chunks_among
 from ...linear.hierarchy import Nodes
 from ...linear.level_matrix import LevelMatrix
+from ...linear.node_blocks import NodeBlocks
 from ...linear.some_rows import SomeRows, residual_rows
+from ...linear.vectors import norm
 from ...problem.judge.measures import contact_residual
 from ...problem.law import Kind, Law, Tied, Tresca
 from ...problem.law.law import BOUND, MU, columns_of, given
@@ -63,8 +65,9 @@ class ContactNodes:
 
     inverse, compliance, to_reaction (nc, 3, 3): A_pp^-1, H^T A_pp^-1 H and H^-1; rho (nc,): of
     the judge; rows: indptr, columns and blocks of their rows of the matrix; near: those of the
-    nodes that they touch; chunks of contacts, which threads share.  State of the iteration:
-    r, u (nc, 3), and state (nc,) of the last local solves.
+    nodes that they touch; chunks of contacts, which threads share; bulk: the rows of all other
+    nodes, where these are the first and contacts the last.  State of the iteration: r, u
+    (nc, 3), and state (nc,) of the last local solves.
     """
 
     node: Index
@@ -76,6 +79,7 @@ class ContactNodes:
     rows: tuple[NDArray[np.int32], NDArray[np.int32], Array]
     near: SomeRows
     chunks: list[Range]
+    bulk: NodeBlocks | None = None
     w: Array = field(default_factory=lambda: np.zeros((0, 3)))
     law: Law = field(default_factory=lambda: Tresca(np.zeros(0)))
     driven: NDArray[np.bool_] = field(default_factory=lambda: np.zeros((0, 3), dtype=bool))
@@ -100,7 +104,8 @@ class ContactNodes:
         near = SomeRows.of(A, np.setdiff1d(rows.indices, node).astype(np.int64))
         return cls(node, H, inverse, compliance, back, 1 / size,
                    (rows.indptr, rows.indices, rows.data), near,
-                   chunks_among(node, rows.indptr, rows.indices))  # fmt: skip
+                   chunks_among(node, rows.indptr, rows.indices),
+                   _bulk(A, near.node, node))  # fmt: skip
 
     def at(self, chosen: NDArray[np.bool_], node: Index, A: LevelMatrix) -> ContactNodes:
         """Some of the contacts at nodes (k,) of another level."""
@@ -175,6 +180,18 @@ class ContactNodes:
             self.rho, self.driven, x, residual, self.r, self.u,
         )  # fmt: skip
 
+    def balance(self, residual: Array) -> tuple[float, float]:
+        """|residual| in the rows of the nodes that contacts touch, and in all but their own."""
+        if self.bulk is not None:
+            first, end = self.bulk.nodes, len(residual) - len(self.node)
+            near = norm(residual[first:end])
+            return near, float(np.hypot(norm(residual[:first]), near))
+        kept = residual[self.node]
+        residual[self.node] = 0.0
+        near, all_but = norm(residual[self.near.node]), norm(residual)
+        residual[self.node] = kept
+        return near, all_but
+
     @cached_property
     def stiffness(self) -> Array:
         """Size of the node's own one, (nc,), unit of A."""
@@ -239,6 +256,13 @@ class ContactNodes:
         """The rows of contacts become W^T of (law's force - force), in place."""
         _combine(self.node, self.H, self.law.kind, self.law.parameters, self.r, self.u,
                  self.state, W, residual)  # fmt: skip
+
+
+def _bulk(A: LevelMatrix, near: Index, node: Index) -> NodeBlocks | None:
+    """The rows of nodes that are neither, where those come last, contacts behind."""
+    first, contact = A.nodes - len(near) - len(node), A.nodes - len(node)
+    last = near.min(initial=first) == first and node.min(initial=contact) == contact
+    return A.leading(first) if isinstance(A, NodeBlocks) and last else None
 
 
 @njit(cache=True, error_model="numpy")
