@@ -15,6 +15,7 @@ from ..core.errors import SingularOperator
 from .aggregation import LARGEST, Aggregates, separates
 from .chunks import better_numbers
 from .coarsest import Factored, factored_at_rest, inverse_at_rest
+from .halves import Halves
 from .level_matrix import LevelMatrix
 from .node_blocks import NodeBlocks
 from .patched import PatchedBlocks, PatchedOperator, Rows, patched
@@ -144,7 +145,7 @@ class Level:
     def __post_init__(self) -> None:
         self.work, self.free = Work(self.A.nodes), np.zeros(self.A.nodes, dtype=bool)
 
-    def of(self, A: LevelMatrix | PatchedBlocks | PatchedOperator) -> Level:
+    def of(self, A: LevelMatrix | Halves | PatchedBlocks | PatchedOperator) -> Level:
         """The same with another matrix."""
         out = copy(self)
         out.A = A

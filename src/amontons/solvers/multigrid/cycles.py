@@ -51,7 +51,8 @@ from numpy.typing import NDArray
 from ...core.arrays import read_only
 from ...core.errors import UnsupportedForm
 from ...core.options import check_options
-from ...linear.vectors import add_scaled, copy_into, dot, norm
+from ...linear.halves import Halves
+from ...linear.vectors import add_scaled, copy_into, dot
 from ...problem.friction import Form, FrictionProblem
 from ..anderson import Anderson
 from ..contract import (
@@ -78,7 +79,7 @@ FEW = 0.01  # share of the closed contacts up to which changed states leave the 
 GRID_DEPTH = 2  # past cycles to mix at most where M is not stored
 STALE = 0.5  # fall of the error in a cycle above which any changed state renews the tangent
 SLOW = 0.8  # fall of the error in a cycle above which, while states change, steps are limited
-LITTLE = 0.5  # share of |residual| in the rows that contacts touch: below it these solve once
+LITTLE = 0.25  # share of |residual| in the rows that contacts touch: below it these solve once
 CLOSE = 0.99  # share of the error that should do at which an iterate is handed out
 
 
@@ -192,6 +193,8 @@ class _Run:
         self.levels, self.tangent, self.options, self.k = levels, tangent, options, k
         self.contacts, self.f, self.load, self.length = given
         self.level = levels.hierarchy.levels[k]
+        self.left = np.empty((self.contacts.others or 0, 3))  # of the load, see `halves`
+        self.known = False  # is that of x?
         self.held = np.zeros(self.level.A.nodes, dtype=bool)
         self.held[self.contacts.node] = True
         tangent.begin(k, self.contacts)
@@ -222,7 +225,7 @@ class _Run:
             self.smooth(x, backward=False)
             for _ in range(self.options.contact_sweeps):
                 self.contacts.relax(self.f, x, self.held, backward=False, once=self.calm)
-            self.level.A.residual(x, self.f, self.r)
+            self.evaluate(x)
             error = self.error(x)
             self.parts = self.contacts.tangent()
             unsettled = self.changed() > MANY * len(self.contacts.node)
@@ -250,6 +253,7 @@ class _Run:
                 if unsettled:
                     long.forget()
                 long.mix(before.reshape(-1), x.reshape(-1))
+                self.known = False
 
     def changed(self) -> int:
         """Number of contacts in another state than in the tangent."""
@@ -262,8 +266,25 @@ class _Run:
 
     def smooth(self, x: Array, backward: bool) -> None:
         """One sweep in the bulk; nodes that contacts touch are visited with these (`relax`)."""
-        A = self.contacts.bulk or self.level.A
-        A.smooth(self.f, x, self.held, backward)
+        A = self.level.A
+        if not isinstance(A, Halves):
+            (self.contacts.bulk or A).smooth(self.f, x, self.held, backward)
+        elif backward:
+            A.backward(self.f, x, self.left)
+        else:
+            if not self.known:
+                A.subtract_after(x, self.f, self.left)
+            A.forward(self.f, x, self.left)
+        self.known = backward
+
+    def evaluate(self, x: Array) -> None:
+        """The residual after a forward sweep and the visits of contacts."""
+        A = self.level.A
+        if isinstance(A, Halves):
+            A.subtract_after(x, self.left, self.r[: A.count])
+            self.contacts.residual(self.f, x, self.r)
+        else:
+            A.residual(x, self.f, self.r)
 
     def accelerate(self, x: Array, error: float, mixing: LeastResidual) -> float:
         """x as the best of the last points, with its law kept; its error.

@@ -10,6 +10,7 @@ from scipy import sparse
 
 from ...linear.blocks import spatial
 from ...linear.chunks import better_numbers
+from ...linear.halves import Halves
 from ...linear.hierarchy import Hierarchy, Level, Nodes, append_level
 from ...linear.node_blocks import NodeBlocks, slots_of_rows
 from ...linear.transfer import Transfer
@@ -125,9 +126,12 @@ def _prepare(problem: FrictionProblem) -> ContactLevels:
         raise Breakdown("contact multigrid: M has a diagonal block that is not positive")
     coarse = _coarse_contacts(hierarchy, contacts)
     touched = [contacts.node, *(c.node for _, c in coarse)]
-    return ContactLevels(
-        basis, hierarchy.nodes, hierarchy, contacts, coarse, Truncation(hierarchy, touched)
-    )
+    truncation = Truncation(hierarchy, touched)
+    if basis.coupling is not None and contacts.bulk is not None and len(hierarchy.levels) > 1:
+        assert isinstance(A, NodeBlocks)  # nobody else has these
+        hierarchy.levels[0] = hierarchy.levels[0].of(Halves.of(A, contacts.bulk))
+        contacts.bulk = None
+    return ContactLevels(basis, hierarchy.nodes, hierarchy, contacts, coarse, truncation)
 
 
 def _in_basis(hierarchy: Hierarchy, basis: OneSided) -> Hierarchy:

@@ -65,9 +65,9 @@ class ContactNodes:
 
     inverse, compliance, to_reaction (nc, 3, 3): A_pp^-1, H^T A_pp^-1 H and H^-1; rho (nc,): of
     the judge; rows: indptr, columns and blocks of their rows of the matrix; near: those of the
-    nodes that they touch; chunks of contacts, which threads share; bulk: the rows of all other
-    nodes, where these are the first and contacts the last.  State of the iteration: r, u
-    (nc, 3), and state (nc,) of the last local solves.
+    nodes that they touch; chunks of contacts, which threads share; others: how many other nodes
+    there are, where these are the first and contacts the last; bulk: their rows.  State of the
+    iteration: r, u (nc, 3), and state (nc,) of the last local solves.
     """
 
     node: Index
@@ -79,6 +79,7 @@ class ContactNodes:
     rows: tuple[NDArray[np.int32], NDArray[np.int32], Array]
     near: SomeRows
     chunks: list[Range]
+    others: int | None = None
     bulk: NodeBlocks | None = None
     w: Array = field(default_factory=lambda: np.zeros((0, 3)))
     law: Law = field(default_factory=lambda: Tresca(np.zeros(0)))
@@ -102,10 +103,11 @@ class ContactNodes:
         compliance[k, i, i] = 1.0
         back: Any = np.linalg.pinv(H)
         near = SomeRows.of(A, np.setdiff1d(rows.indices, node).astype(np.int64))
+        others = _others(A.nodes, near.node, node) if isinstance(A, NodeBlocks) else None
+        bulk = A.leading(others) if isinstance(A, NodeBlocks) and others is not None else None
         return cls(node, H, inverse, compliance, back, 1 / size,
                    (rows.indptr, rows.indices, rows.data), near,
-                   chunks_among(node, rows.indptr, rows.indices),
-                   _bulk(A, near.node, node))  # fmt: skip
+                   chunks_among(node, rows.indptr, rows.indices), others, bulk)  # fmt: skip
 
     def at(self, chosen: NDArray[np.bool_], node: Index, A: LevelMatrix) -> ContactNodes:
         """Some of the contacts at nodes (k,) of another level."""
@@ -182,8 +184,8 @@ class ContactNodes:
 
     def balance(self, residual: Array) -> tuple[float, float]:
         """|residual| in the rows of the nodes that contacts touch, and in all but their own."""
-        if self.bulk is not None:
-            first, end = self.bulk.nodes, len(residual) - len(self.node)
+        if self.others is not None:
+            first, end = self.others, len(residual) - len(self.node)
             near = norm(residual[first:end])
             return near, float(np.hypot(norm(residual[:first]), near))
         kept = residual[self.node]
@@ -258,11 +260,11 @@ class ContactNodes:
                  self.state, W, residual)  # fmt: skip
 
 
-def _bulk(A: LevelMatrix, near: Index, node: Index) -> NodeBlocks | None:
-    """The rows of nodes that are neither, where those come last, contacts behind."""
-    first, contact = A.nodes - len(near) - len(node), A.nodes - len(node)
+def _others(nodes: int, near: Index, node: Index) -> int | None:
+    """How many nodes are neither, where those are the last, contacts behind."""
+    first, contact = nodes - len(near) - len(node), nodes - len(node)
     last = near.min(initial=first) == first and node.min(initial=contact) == contact
-    return A.leading(first) if isinstance(A, NodeBlocks) and last else None
+    return first if last else None
 
 
 @njit(cache=True, error_model="numpy")
