@@ -278,7 +278,6 @@ def test_matrices_of_the_problem_are_not_touched(make):
     problem = make().assemble()
     hierarchies = [problem.hierarchy, ContactLevels.of(problem).hierarchy]
 
-
     def arrays_of(hierarchy):
         matrices = [part for level in hierarchy.levels for part in vars(level.A).values()]
         blocks = [x for part in matrices for x in (part if isinstance(part, tuple) else [part])]

@@ -6,7 +6,9 @@ One cycle, from v on the finest level:
    contact and friction exactly (`nodes`), once before and once after the nodes that it touches
    have been swept again.  In one-sided bases these couple strongly with the contacts, and so
    does the master side: without that sweep cycles doubled with every refinement.  Where their
-   rows hold LITTLE of the residual, the first of the two solves is left out.
+   rows hold LITTLE of the residual, the first of the two solves is left out.  Of two bodies
+   these nodes have the last numbers and are left out of the sweep in the bulk, which then
+   continues the one of the cycle before (`linear.halves`).
 2. mix: of this point and the last ones, the one with the least residual (`least_residual`);
    contacts solve again unless none has changed its state, and states, reactions and residual
    are of this v.
@@ -80,6 +82,7 @@ GRID_DEPTH = 2  # past cycles to mix at most where M is not stored
 STALE = 0.5  # fall of the error in a cycle above which any changed state renews the tangent
 SLOW = 0.8  # fall of the error in a cycle above which, while states change, steps are limited
 LITTLE = 0.25  # share of |residual| in the rows that contacts touch: below it these solve once
+ALONE = 2.0  # times as much where these rows are swept with contacts alone, not in the bulk too
 CLOSE = 0.99  # share of the error that should do at which an iterate is handed out
 
 
@@ -323,7 +326,8 @@ class _Run:
         """The measure of `judge` from the residual of x; reactions become those of x."""
         law = self.contacts.natural_map(x, self.r)
         near, balance = self.contacts.balance(self.r)
-        self.calm = near < LITTLE * balance
+        share = LITTLE if self.contacts.others is None else ALONE * LITTLE
+        self.calm = near < share * balance
         return max(balance / self.load, law / self.length)
 
     def renew(self, frozen: bool) -> None:
