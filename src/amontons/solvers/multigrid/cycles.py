@@ -7,8 +7,8 @@ One cycle, from v on the finest level:
    have been swept again.  In one-sided bases these couple strongly with the contacts, and so
    does the master side: without that sweep cycles doubled with every refinement.  Where their
    rows hold LITTLE of the residual, the first of the two solves is left out.  Of two bodies
-   these nodes have the last numbers and are left out of the sweep in the bulk, which then
-   continues the one of the cycle before (`linear.halves`).
+   these nodes and contacts have the last numbers; the sweep over the others continues the one
+   of the cycle before (`linear.halves`).
 2. mix: of this point and the last ones, the one with the least residual (`least_residual`);
    contacts solve again unless none has changed its state, and states, reactions and residual
    are of this v.
@@ -82,7 +82,6 @@ GRID_DEPTH = 2  # past cycles to mix at most where M is not stored
 STALE = 0.5  # fall of the error in a cycle above which any changed state renews the tangent
 SLOW = 0.8  # fall of the error in a cycle above which, while states change, steps are limited
 LITTLE = 0.25  # share of |residual| in the rows that contacts touch: below it these solve once
-ALONE = 2.0  # times as much where these rows are swept with contacts alone, not in the bulk too
 CLOSE = 0.99  # share of the error that should do at which an iterate is handed out
 
 
@@ -268,16 +267,20 @@ class _Run:
         return self.changed() <= FEW * closed
 
     def smooth(self, x: Array, backward: bool) -> None:
-        """One sweep in the bulk; nodes that contacts touch are visited with these (`relax`)."""
-        A = self.level.A
+        """One sweep over all nodes but those of contacts; what these touch is next to them."""
+        A, contacts = self.level.A, self.contacts
+        if backward and contacts.others is not None:
+            contacts.near.smooth(self.f, x, self.held, backward)
         if not isinstance(A, Halves):
-            (self.contacts.bulk or A).smooth(self.f, x, self.held, backward)
+            (contacts.bulk or A).smooth(self.f, x, self.held, backward)
         elif backward:
             A.backward(self.f, x, self.left)
         else:
             if not self.known:
                 A.subtract_after(x, self.f, self.left)
             A.forward(self.f, x, self.left)
+        if contacts.others is not None and not backward:
+            contacts.near.smooth(self.f, x, self.held, backward)
         self.known = backward
 
     def evaluate(self, x: Array) -> None:
@@ -326,8 +329,7 @@ class _Run:
         """The measure of `judge` from the residual of x; reactions become those of x."""
         law = self.contacts.natural_map(x, self.r)
         near, balance = self.contacts.balance(self.r)
-        share = LITTLE if self.contacts.others is None else ALONE * LITTLE
-        self.calm = near < share * balance
+        self.calm = near < LITTLE * balance
         return max(balance / self.load, law / self.length)
 
     def renew(self, frozen: bool) -> None:
