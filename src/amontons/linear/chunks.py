@@ -57,13 +57,22 @@ def chunks_of(
 
 
 def chunks_of_sorted(indptr: Integers, indices: Integers) -> list[Range]:
-    """The same for a pattern with a diagonal and ascending columns."""
+    """The same for a pattern with a diagonal and ascending columns.
+
+    Columns beyond the last row couple no rows: nobody writes there.
+    """
+    rows = len(indptr) - 1
     if indptr[-1] < LEAST_ENTRIES:
-        return [(0, len(indptr) - 1)]
-    return chunks_of(indptr, indices[indptr[:-1]], indices[indptr[1:] - 1])
+        return [(0, rows)]
+    last = indices[indptr[1:] - 1]
+    if last.max() >= rows:
+        return chunks_among(np.arange(rows), indptr, indices, COUNTS[0])
+    return chunks_of(indptr, indices[indptr[:-1]], last)
 
 
-def chunks_among(node: Integers, indptr: Integers, indices: Integers) -> list[Range]:
+def chunks_among(
+    node: Integers, indptr: Integers, indices: Integers, most: int = FEW
+) -> list[Range]:
     """The same for the rows of some nodes (k,), in this order, by couplings among these."""
     rows = len(node)
     if indptr[-1] < LEAST_ENTRIES:
@@ -73,7 +82,7 @@ def chunks_among(node: Integers, indptr: Integers, indices: Integers) -> list[Ra
     own = number[indices]
     first = np.minimum.reduceat(np.where(own < 0, rows, own), indptr[:-1])
     last = np.maximum.reduceat(own, indptr[:-1])
-    return chunks_of(indptr, first, last, most=FEW)
+    return chunks_of(indptr, first, last, most=most)
 
 
 def better_numbers(indptr: Integers, indices: Integers, width: int = 1) -> Index | None:

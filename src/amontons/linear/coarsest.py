@@ -2,13 +2,30 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+
 import numpy as np
 from numpy.typing import NDArray
 
 from .node_blocks import DEAD
 
 Array = NDArray[np.float64]
+SURE = 1e-7  # determinant of a block, relative to its size, from which no direction rests
 SMALL = 1e-10  # singular values of the coarsest matrix below this part of the largest rest
+
+
+@dataclass(frozen=True, eq=False)
+class Factored:
+    """P L U of a matrix, for `inverse @ b`: made in a quarter of the time of the inverse."""
+
+    factor: Array
+    pivots: NDArray[np.int32]
+
+    def __matmul__(self, b: Array) -> Array:
+        """The solution for b, (n,)."""
+        from scipy.linalg import lapack
+
+        return lapack.dgetrs(self.factor, self.pivots, b)[0]
 
 
 def inverse_at_rest(A: Array, diagonal: Array, size: Array) -> Array:
@@ -18,15 +35,33 @@ def inverse_at_rest(A: Array, diagonal: Array, size: Array) -> Array:
     """
     if not A.size:
         return A
-    left, s, right = np.linalg.svd(diagonal)
-    dead = s <= DEAD * size[:, None]
-    k = np.arange(len(diagonal))
-    whole = A.reshape(len(k), 3, len(k), 3).copy()
-    whole[k, :, k, :] += size[:, None, None] * ((left * dead[:, None, :]) @ right)
-    whole = whole.reshape(A.shape)
+    whole = _held_at_rest(A, diagonal, size)
     out = _inverse(whole)
     regular = out is not None and np.abs(out).max() * np.abs(whole).max() * SMALL < 1
     return out if out is not None and regular else pseudo_inverse(A)
+
+
+def factored_at_rest(A: Array, diagonal: Array, size: Array) -> Array | Factored:
+    """The same to multiply with a few times only."""
+    from scipy.linalg import lapack
+
+    if not A.size:
+        return A
+    whole = np.asfortranarray(_held_at_rest(A, diagonal, size))
+    length = np.abs(whole).sum(axis=0).max()
+    factor, pivots, singular = lapack.dgetrf(whole, overwrite_a=True)
+    regular = not singular and lapack.dgecon(factor, length)[0] > SMALL
+    return Factored(factor, pivots) if regular else pseudo_inverse(A)
+
+
+def _held_at_rest(A: Array, diagonal: Array, size: Array) -> Array:
+    """A with a stiffness in the directions in which its diagonal blocks have none."""
+    k = np.flatnonzero(~(np.abs(np.linalg.det(diagonal)) > SURE * size**3))
+    left, s, right = np.linalg.svd(diagonal[k])
+    dead = s <= DEAD * size[k, None]
+    whole = A.reshape(len(diagonal), 3, len(diagonal), 3).copy()
+    whole[k, :, k, :] += size[k, None, None] * ((left * dead[:, None, :]) @ right)
+    return whole.reshape(A.shape)
 
 
 def _inverse(A: Array) -> Array | None:

@@ -97,6 +97,13 @@ class NodeBlocks:
             ends.astype(np.int32), self.indices[slots], self.data[slots], self.inverse[node]
         )
 
+    def leading(self, count: int) -> NodeBlocks:
+        """The first rows, which share their arrays with this matrix."""
+        end = self.indptr[count]
+        return NodeBlocks(
+            self.indptr[: count + 1], self.indices[:end], self.data[:end], self.inverse[:count]
+        )
+
     def coarse(self, P: Transfer) -> NodeBlocks:
         """P^T A P, with ones at coarse padding."""
         return P.galerkin(self)

@@ -7,6 +7,7 @@ matrix that several solves read at the same time and nobody writes to.
 from __future__ import annotations
 
 from dataclasses import dataclass, field, replace
+from functools import cached_property
 
 import numpy as np
 from numba import uint64
@@ -59,6 +60,13 @@ class PatchedBlocks:
         """Number of block rows."""
         return self.base.nodes
 
+    @cached_property
+    def _first(self) -> NodeBlocks | None:
+        """The rows of base before its own, where these are the last ones."""
+        first = self.nodes - len(self.rows.node)
+        ends = not len(self.rows.node) or self.rows.node[0] == first
+        return self.base.leading(first) if ends else None
+
     @property
     def _arrays(self) -> tuple[Array | NDArray[np.int32], ...]:
         A, own = self.base, self.rows
@@ -67,6 +75,14 @@ class PatchedBlocks:
 
     def smooth(self, b: Array, x: Array, held: NDArray[np.bool_], backward: bool) -> None:
         """A block Gauss-Seidel sweep on A x = b over the nodes that are not held."""
+        if self._first is not None:
+            own = self.data, self.inverse, b, x, held, backward
+            if backward:
+                self.rows.sweep(*own)
+            self._first.smooth(b, x, held, backward)
+            if not backward:
+                self.rows.sweep(*own)
+            return
         over_stages(_sweep, self.base.chunks, self.base.work, *self._arrays, b, x, held,
                     backward, backward=backward)  # fmt: skip
 
@@ -79,6 +95,10 @@ class PatchedBlocks:
     def residual(self, x: Array, b: Array, out: Array) -> None:
         """out = b - A x."""
         A = self.base
+        if self._first is not None:
+            self._first.residual(x, b, out)
+            self.rows.evaluate(self.data, x, b, out)
+            return
         over_rows(_residual, A.nodes, A.work, *self._arrays, x, b, out)
 
     def stored(self) -> NodeBlocks:

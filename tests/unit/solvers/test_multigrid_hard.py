@@ -160,7 +160,7 @@ def test_slip_ends_where_it_would_turn_round(monkeypatch):
 
 def test_a_tangent_renewed_in_parts_is_the_tangent(monkeypatch):
     """Only what has changed is multiplied, and the sum of it is what the states ask for."""
-    run, _ = cycles_at(judged_by_residual(die(1).assemble(), monkeypatch), 6)
+    run, _ = cycles_at(judged_by_residual(die(1).assemble(), monkeypatch), 8)
     assert run.updates >= 3
     parts = run.tangent
     at_once = Tangent(run.levels.truncation)

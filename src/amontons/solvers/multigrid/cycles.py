@@ -6,7 +6,9 @@ One cycle, from v on the finest level:
    contact and friction exactly (`nodes`), once before and once after the nodes that it touches
    have been swept again.  In one-sided bases these couple strongly with the contacts, and so
    does the master side: without that sweep cycles doubled with every refinement.  Where their
-   rows hold LITTLE of the residual, the first of the two solves is left out.
+   rows hold LITTLE of the residual, the first of the two solves is left out.  Of two bodies
+   these nodes and contacts have the last numbers; the sweep over the others continues the one
+   of the cycle before (`linear.halves`).
 2. mix: of this point and the last ones, the one with the least residual (`least_residual`);
    contacts solve again unless none has changed its state, and states, reactions and residual
    are of this v.
@@ -51,7 +53,8 @@ from numpy.typing import NDArray
 from ...core.arrays import read_only
 from ...core.errors import UnsupportedForm
 from ...core.options import check_options
-from ...linear.vectors import BESIDE, add_scaled, copy_into, dot, norms_of
+from ...linear.halves import Halves
+from ...linear.vectors import BESIDE, add_scaled, copy_into, dot
 from ...problem.friction import Form, FrictionProblem
 from ..anderson import Anderson
 from ..contract import (
@@ -192,6 +195,8 @@ class _Run:
         self.levels, self.tangent, self.options, self.k = levels, tangent, options, k
         self.contacts, self.f, self.load, self.length = given
         self.level = levels.hierarchy.levels[k]
+        self.left = np.empty((self.contacts.others or 0, 3))  # of the load, see `halves`
+        self.known = False  # is that of x?
         self.held = np.zeros(self.level.A.nodes, dtype=bool)
         self.held[self.contacts.node] = True
         self.kind = self.held.astype(np.int8)
@@ -224,7 +229,7 @@ class _Run:
             self.smooth(x, backward=False)
             for _ in range(self.options.contact_sweeps):
                 self.contacts.relax(self.f, x, self.held, backward=False, once=self.calm)
-            self.level.A.residual(x, self.f, self.r)
+            self.evaluate(x)
             error = self.error(x)
             self.parts = self.contacts.tangent()
             unsettled = self.changed() > MANY * len(self.contacts.node)
@@ -252,6 +257,7 @@ class _Run:
                 if unsettled:
                     long.forget()
                 long.mix(before.reshape(-1), x.reshape(-1))
+                self.known = False
 
     def changed(self) -> int:
         """Number of contacts in another state than in the tangent."""
@@ -263,8 +269,30 @@ class _Run:
         return self.changed() <= FEW * closed
 
     def smooth(self, x: Array, backward: bool) -> None:
-        """One sweep in the bulk."""
-        self.level.A.smooth(self.f, x, self.held, backward)
+        """One sweep over all nodes but those of contacts; what these touch is next to them."""
+        A, contacts = self.level.A, self.contacts
+        if backward and contacts.others is not None:
+            contacts.near.smooth(self.f, x, self.held, backward)
+        if not isinstance(A, Halves):
+            (contacts.bulk or A).smooth(self.f, x, self.held, backward)
+        elif backward:
+            A.backward(self.f, x, self.left)
+        else:
+            if not self.known:
+                A.subtract_after(x, self.f, self.left)
+            A.forward(self.f, x, self.left)
+        if contacts.others is not None and not backward:
+            contacts.near.smooth(self.f, x, self.held, backward)
+        self.known = backward
+
+    def evaluate(self, x: Array) -> None:
+        """The residual after a forward sweep and the visits of contacts."""
+        A = self.level.A
+        if isinstance(A, Halves):
+            A.subtract_after(x, self.left, self.r[: A.count])
+            self.contacts.residual(self.f, x, self.r)
+        else:
+            A.residual(x, self.f, self.r)
 
     def accelerate(self, x: Array, error: float, mixing: LeastResidual) -> float:
         """x as the best of the last points, with its law kept; its error.
@@ -302,7 +330,7 @@ class _Run:
     def error(self, x: Array) -> float:
         """The measure of `judge` from the residual of x; reactions become those of x."""
         law = self.contacts.natural_map(x, self.r)
-        balance, near = norms_of(self.r, self.kind)
+        balance, near = self.contacts.balance(self.r, self.kind)
         self.calm = near < LITTLE * balance
         return max(balance / self.load, law / self.length)
 

@@ -10,7 +10,9 @@ from scipy import sparse
 
 from ...linear.blocks import spatial
 from ...linear.chunks import better_numbers
+from ...linear.halves import Halves
 from ...linear.hierarchy import Hierarchy, Level, Nodes, append_level
+from ...linear.node_blocks import NodeBlocks, slots_of_rows
 from ...linear.transfer import Transfer
 from ...problem.friction import FrictionProblem
 from ...problem.law.law import BOUND
@@ -21,6 +23,7 @@ from .truncation import Truncation
 
 Array = NDArray[np.float64]
 Index = NDArray[np.int64]
+Integers = NDArray[np.integer]
 TINY = float(np.finfo(float).tiny)
 ROUNDING = 1e-13  # of the weights of a prolongation
 
@@ -123,9 +126,12 @@ def _prepare(problem: FrictionProblem) -> ContactLevels:
         raise Breakdown("contact multigrid: M has a diagonal block that is not positive")
     coarse = _coarse_contacts(hierarchy, contacts)
     touched = [contacts.node, *(c.node for _, c in coarse)]
-    return ContactLevels(
-        basis, hierarchy.nodes, hierarchy, contacts, coarse, Truncation(hierarchy, touched)
-    )
+    truncation = Truncation(hierarchy, touched)
+    if basis.coupling is not None and contacts.bulk is not None and len(hierarchy.levels) > 1:
+        assert isinstance(A, NodeBlocks)  # nobody else has these
+        hierarchy.levels[0] = hierarchy.levels[0].of(Halves.of(A, contacts.bulk))
+        contacts.bulk = None
+    return ContactLevels(basis, hierarchy.nodes, hierarchy, contacts, coarse, truncation)
 
 
 def _in_basis(hierarchy: Hierarchy, basis: OneSided) -> Hierarchy:
@@ -139,6 +145,10 @@ def _in_basis(hierarchy: Hierarchy, basis: OneSided) -> Hierarchy:
     number = better_numbers(A.indptr, A.indices)
     if number is not None:
         nodes, A = nodes.renumbered(number), A.renumbered(number)
+    contact = nodes.place[basis.dofs[:, 0]] // 3
+    last, changed = _numbers_with_last(A, contact, contact[:0])
+    nodes, A, contact = nodes.renumbered(last), A.renumbered(last), last[contact]
+    number = last if number is None else last[number]
     levels = [Level(A)]
     size = 3 * nodes.count
     C = basis.coupling.tocoo()
@@ -152,8 +162,31 @@ def _in_basis(hierarchy: Hierarchy, basis: OneSided) -> Hierarchy:
         if coupling.nnz:
             P, coupling = _between_bases(P, coupling, geometric=k + 1 < hierarchy.geometric)
         coarse = append_level(levels, P, coarse)
+        P, A = levels[k].P, levels[k + 1].A
+        assert P is not None and isinstance(A, NodeBlocks)
+        found = _on_coarse(P, contact) if k + 1 < hierarchy.geometric else None
+        contact = contact[:0] if found is None else found[1]
+        above = P.indices[slots_of_rows(P.indptr, changed)[0]]
+        last, changed = _numbers_with_last(A, contact, above)
+        levels[k].P, levels[k + 1] = P.renumbered(None, last), Level(A.renumbered(last))
+        coarse, contact = last if coarse is None else last[coarse], last[contact]
     out = Hierarchy(levels, hierarchy.geometric, nodes)
     return out if hierarchy.kind is None else out.made_of(hierarchy.kind)
+
+
+def _numbers_with_last(A: NodeBlocks, contact: Index, above: Integers) -> tuple[Index, Index]:
+    """(New numbers of nodes, (n,), nodes that the contacts change, numbered so).
+
+    These come last, above: those of a finer level; behind them what contacts touch, and the
+    contacts: others are swept and evaluated in one stream of memory then.
+    """
+    rank = np.zeros(A.nodes, dtype=np.int8)
+    rank[above] = 1
+    rank[A.indices[A.slots(contact)[0]]] = 2
+    rank[contact] = 3
+    number = np.empty(A.nodes, dtype=np.int64)
+    number[np.argsort(rank, kind="stable")] = np.arange(A.nodes)
+    return number, np.arange(np.count_nonzero(rank == 0), A.nodes)
 
 
 def _between_bases(
@@ -200,16 +233,28 @@ def _coarse_contacts(
     for k in range(1, hierarchy.geometric):
         P, A = hierarchy.levels[k - 1].P, hierarchy.levels[k].A
         assert P is not None
-        if len(P.blocks):
+        on_coarse = _on_coarse(P, contacts.node)
+        if on_coarse is None:
             break
-        parent = _parent(P, contacts.node)
-        found = parent >= 0
-        if not found.any() or len(np.unique(parent[found])) < found.sum():
-            break
+        found, node = on_coarse
         kept = kept[found]
-        contacts = contacts.at(found, parent[found], A)
+        contacts = contacts.at(found, node, A)
         out.append((kept, contacts))
     return out
+
+
+def _on_coarse(P: Transfer, node: Index) -> tuple[NDArray[np.bool_], Index] | None:
+    """Which of the nodes of contacts are nodes of the coarse level, and where these are there.
+
+    None where there are none, or no nodes of their own.
+    """
+    if len(P.blocks):
+        return None
+    parent = _parent(P, node)
+    found = parent >= 0
+    if not found.any() or len(np.unique(parent[found])) < found.sum():
+        return None
+    return found, parent[found]
 
 
 def _parent(P: Transfer, node: NDArray[np.integer]) -> Index:

@@ -40,7 +40,9 @@ from ...core.threads import Range, over_rows, over_stages
 from ...linear.chunks import chunks_among
 from ...linear.hierarchy import Nodes
 from ...linear.level_matrix import LevelMatrix
+from ...linear.node_blocks import NodeBlocks
 from ...linear.some_rows import SomeRows, residual_rows
+from ...linear.vectors import norm, norms_of
 from ...problem.judge.measures import contact_residual
 from ...problem.law import Kind, Law, Tied, Tresca
 from ...problem.law.law import BOUND, MU, columns_of, given
@@ -63,8 +65,9 @@ class ContactNodes:
 
     inverse, compliance, to_reaction (nc, 3, 3): A_pp^-1, H^T A_pp^-1 H and H^-1; rho (nc,): of
     the judge; rows: indptr, columns and blocks of their rows of the matrix; near: those of the
-    nodes that they touch; chunks of contacts, which threads share.  State of the iteration:
-    r, u (nc, 3), and state (nc,) of the last local solves.
+    nodes that they touch; chunks of contacts, which threads share; others: how many other nodes
+    there are, where these are the first and contacts the last; bulk: their rows.  State of the
+    iteration: r, u (nc, 3), and state (nc,) of the last local solves.
     """
 
     node: Index
@@ -76,6 +79,8 @@ class ContactNodes:
     rows: tuple[NDArray[np.int32], NDArray[np.int32], Array]
     near: SomeRows
     chunks: list[Range]
+    others: int | None = None
+    bulk: NodeBlocks | None = None
     w: Array = field(default_factory=lambda: np.zeros((0, 3)))
     law: Law = field(default_factory=lambda: Tresca(np.zeros(0)))
     driven: NDArray[np.bool_] = field(default_factory=lambda: np.zeros((0, 3), dtype=bool))
@@ -98,9 +103,11 @@ class ContactNodes:
         compliance[k, i, i] = 1.0
         back: Any = np.linalg.pinv(H)
         near = SomeRows.of(A, np.setdiff1d(rows.indices, node).astype(np.int64))
+        others = _others(A.nodes, near.node, node) if isinstance(A, NodeBlocks) else None
+        bulk = A.leading(others) if isinstance(A, NodeBlocks) and others is not None else None
         return cls(node, H, inverse, compliance, back, 1 / size,
                    (rows.indptr, rows.indices, rows.data), near,
-                   chunks_among(node, rows.indptr, rows.indices))  # fmt: skip
+                   chunks_among(node, rows.indptr, rows.indices), others, bulk)  # fmt: skip
 
     def at(self, chosen: NDArray[np.bool_], node: Index, A: LevelMatrix) -> ContactNodes:
         """Some of the contacts at nodes (k,) of another level."""
@@ -175,6 +182,14 @@ class ContactNodes:
             self.rho, self.driven, x, residual, self.r, self.u,
         )  # fmt: skip
 
+    def balance(self, residual: Array, kind: NDArray[np.int8]) -> tuple[float, float]:
+        """|residual| in the rows of all nodes but their own, and of those BESIDE alone."""
+        if self.others is None:
+            return norms_of(residual, kind)
+        first, end = self.others, len(residual) - len(self.node)
+        near = norm(residual[first:end])
+        return float(np.hypot(norm(residual[:first]), near)), near
+
     @cached_property
     def stiffness(self) -> Array:
         """Size of the node's own one, (nc,), unit of A."""
@@ -239,6 +254,13 @@ class ContactNodes:
         """The rows of contacts become W^T of (law's force - force), in place."""
         _combine(self.node, self.H, self.law.kind, self.law.parameters, self.r, self.u,
                  self.state, W, residual)  # fmt: skip
+
+
+def _others(nodes: int, near: Index, node: Index) -> int | None:
+    """How many nodes are neither, where those are the last, contacts behind."""
+    first, contact = nodes - len(near) - len(node), nodes - len(node)
+    last = near.min(initial=first) == first and node.min(initial=contact) == contact
+    return first if last else None
 
 
 @njit(cache=True, error_model="numpy")

@@ -11,7 +11,7 @@ from numba import uint64
 from numpy.typing import NDArray
 
 from ...core.compiled import njit
-from ...linear.coarsest import inverse_at_rest
+from ...linear.coarsest import Factored, factored_at_rest
 from ...linear.node_blocks import block_inverse
 from .nodes import ContactNodes
 from .products import Sum
@@ -32,7 +32,7 @@ class Tangent:
         self.sums: dict[int, Sum] = {}  # what changes on a level
         self.halves: dict[int, Sum] = {}  # of the products
         self.below: dict[int, Array] = {}  # what has changed in all, of the levels below k
-        self.inverse: Array | None = None  # on level k, where that is the coarsest
+        self.inverse: Array | Factored | None = None  # on level k, where that is the coarsest
 
     def begin(self, k: int, contacts: ContactNodes) -> None:
         """Take contacts on level k, whose tangent is that of open ones so far."""
@@ -73,7 +73,7 @@ class Tangent:
             matrix[near[self.k].row, :, near[self.k].column, :] += self.change
             size, k = np.abs(A.diagonal_blocks).max(axis=(1, 2)), np.arange(A.nodes)
             whole = matrix.reshape(3 * A.nodes, 3 * A.nodes)
-            self.inverse = inverse_at_rest(whole, matrix[k, :, k, :], size)
+            self.inverse = factored_at_rest(whole, matrix[k, :, k, :], size)
         return (self.inverse @ b.reshape(-1)).reshape(b.shape)
 
     # ---------------------------------------------------------------- levels below
@@ -97,7 +97,7 @@ class Tangent:
             _add(sums.found, sums.blocks, self.below[j + 1])
             self._put(j + 1, sums.found)
         if self.k < last:
-            self.hierarchy.invert_coarsest()
+            self.hierarchy.factor_coarsest()
         for j in range(self.k + 1, last + 1):
             self.sums[j].clear()
 
