@@ -5,9 +5,7 @@ none is left.  Then it waits for those parts alone that a helper is at.  So a he
 late, as on a busy machine, costs nothing, and neither callers at the same time nor a call out
 of a part can wait for each other.
 
-Helpers sleep on one queue of calls, and look for parts whenever they have taken one from it.
-Who is about to sleep looks for an instant whether that is worth it (`watching`): helpers at the
-number of the last call, callers who wait for a part at the number of the last part's end.  A
+Helpers sleep on one queue of calls, and look for parts whenever they have taken one from it.  A
 region has a seat for each helper that it asked for, so that it has no more threads than that.
 Helpers know it by a weak reference: one that comes late keeps nothing of the caller's.  They
 are started where open regions together want more than there are, and stay until the interpreter
@@ -28,8 +26,6 @@ from queue import SimpleQueue
 from threading import Thread
 from typing import Any
 from weakref import ref
-
-from .watching import Number
 
 MOST = 256  # helpers
 FAREWELL = 1.0  # s to wait for a helper at the end that seems to be idle
@@ -92,12 +88,8 @@ class Region:
     def _wait(self) -> None:
         for k, bell in enumerate(self.bells):
             if self.taken.setdefault(k, self) is not self:  # the caller's own are over
-                while True:
-                    known = _ends.now()
-                    if k in self.ended:
-                        break
-                    if not _ends.differs(known):
-                        bell.acquire()
+                while k not in self.ended:
+                    bell.acquire()
         self.closed = True
 
     def errors(self) -> list[BaseException]:
@@ -113,7 +105,6 @@ class _Team:
 
     def __init__(self) -> None:
         self.calls: SimpleQueue[None] = SimpleQueue()
-        self.called = Number()
         self.open: set[ref[Region]] = set()  # of closed ones too, while somebody has them
         self.helpers: set[_Helper] = set()
         self.ended = False
@@ -124,7 +115,6 @@ class _Team:
         for _ in range(region.helpers):
             if self.calls.qsize() < len(self.helpers):  # else all are about to look
                 self.calls.put(None)
-        self.called.change()
         wanted = min(sum([each.helpers for each in self.regions()]), MOST)
         while len(self.helpers) < wanted and not self.ended:
             helper = _Helper(self, len(self.helpers) + 1)
@@ -162,14 +152,11 @@ class _Helper:
         self.thread = Thread(target=self._live, name=f"amontons_{number}", daemon=True)
 
     def _live(self) -> None:
-        called = self.team.called
         self.team.helpers.add(self)  # its starter may have been interrupted before that
         while not self.team.ended:
             self.busy = True
-            known = called.now()
             self._help()
             self.busy = False
-            called.differs(known, tells=_ends)  # then its call is there or comes at once
             self.team.calls.get()
 
     def _help(self) -> None:
@@ -188,7 +175,7 @@ def _locked() -> LockType:
     return lock
 
 
-_team, _ends = _Team(), Number()
+_team = _Team()
 
 
 def together(work: Callable[[Part], None], parts: Sequence[Part], threads: int) -> None:

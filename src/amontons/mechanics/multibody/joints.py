@@ -36,19 +36,9 @@ from scipy.sparse.csgraph import connected_components
 
 from ...solvers.newton.block_lu import analyse_pattern
 from .bodies import GROUND, RigidBodies
-from .bonds import (
-    Pattern,
-    aimed,
-    closed_by,
-    factorised,
-    global_inverse,
-    joint_rows,
-    kept_to,
-    left_of,
-    pulled_by,
-    solved_bonds,
-)
-from .rows import Rows, delassus, levers_of, rotations
+from .bonds import aimed, closed_by, joint_rows, kept_to, left_of, pulled_by
+from .joint_factor import Pattern, factorised, solved_bonds
+from .rows import Rows, delassus, global_inverse, levers_of, rotations
 from .states import Motion
 
 Array = NDArray[np.float64]
