@@ -172,10 +172,12 @@ def test_a_wedged_rod_stays():
     rod = RigidBody(cuboid((1, 0.1, 0.1)), 1000, (0.5, 0, 0.05), velocity=(0, 0, 1),
                     spin=(0, -2, 0))  # fmt: skip
     joints = [Joint(0, GROUND, (0, y, 0.05)) for y in (-0.05, 0.05)]
-    steps = run(RigidBodies([rod], planes, mu=0.2, joints=joints), 1e-3, 0.05)
+    steps = run(RigidBodies([rod], planes, mu=0.2, joints=joints), 1e-3, 0.05,
+                tolerance=1e-10)  # the speeds of what keeps still are rounding of the solve
     E = energy(steps)
     assert np.diff(E).max() < 1e-6 * E[0]
-    assert np.abs(steps[-1].state.motion.velocity).max() < 1e-5  # a step gives 1e-2
+    speeds = [np.abs(step.velocity).max() for step in steps[20:]]
+    assert max(speeds) < 1e-5  # a step gives 1e-2
     np.testing.assert_allclose(steps[-1].position[0], (0.5, 0, 0.05), atol=2e-3)
 
 

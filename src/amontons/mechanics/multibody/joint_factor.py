@@ -2,9 +2,9 @@
 
 W_JJ^+ is (W_JJ + e)^-1 refined with W_JJ: rows that say something twice get equal shares.  e is
 a part of the mean diagonal of those joints that are linked by bodies, of no others.  What is
-left of one null direction after another has an error of rounding over e: the pivot of a weld, of
-three joints, may vanish by chance, and with it all digits.  So each factor is tried on a vector,
-and e grows where (W + e) does not bring it back.
+left of one null direction after another has an error of rounding over e: the pivot of a weld,
+of three joints, may vanish by chance, and with it all digits.  So each factor is tried on a
+vector, and e grows where (W + e) does not bring it back.
 """
 
 from __future__ import annotations
