@@ -267,8 +267,10 @@ class MortarMeeting:
         """
         if not self.shared.leaving.any():
             return np.ones(len(self.slaves))
-        onto_master = self.averages[:, self.pair.master.every].sum(axis=1)
-        return np.where(self.met, -np.asarray(onto_master).ravel(), 1.0)
+        parts, row = self.shared, self.rows
+        borne = (parts.psi @ parts.mass.sum(axis=2)[:, :, None])[:, :, 0]
+        borne = np.bincount(row[row >= 0], borne[row >= 0], minlength=len(self.slaves))
+        return np.where(self.met, borne * self.by_weight, 1.0)
 
     @property
     def met_averages(self) -> sparse.csr_array:
