@@ -224,6 +224,22 @@ def test_what_several_processes_can_not_solve_is_named(model, word):
         whole(model)
 
 
+@pytest.mark.parametrize(("where", "held", "words", "at"), [
+    (lambda x: x[:, 0] > 40, [], r"from \[0, 0\] to \[1, 0\]; got False for all",
+     ("contacts", 0, "where")),
+    (None, [am.Fix("bottom", 0)], "every slave node is fixed by a support, no contact is left$",
+     ("contacts",)),
+])  # fmt: skip
+def test_why_no_contact_is_left_is_said(where, held, words, at):
+    """A `where` that selects nobody, or supports that hold all."""
+    body = am.Body(am.box((1, 1), 2), STEEL)
+    contact = am.Contact("bottom", am.Plane((0, 1)), mu=0.3, where=where)
+    model = am.Model([body], [am.Fix("top", 0), *held], [contact])
+    with pytest.raises(InvalidInput, match=words) as told:
+        whole(model)
+    assert told.value.at == at
+
+
 def test_an_error_of_one_process_is_raised_on_all():
     class Comm:
         def allgather(self, mine):

@@ -6,6 +6,8 @@ is overclosure times stiffness, also at nodes that are faced by half, CSHEAR1 sl
 slope, and the area that it prints (CF) the one of now.
 """
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from tangent_checker import checked_tangents
@@ -79,6 +81,80 @@ def test_springs_are_those_of_the_area_that_is_faced(dim, first, last, area, hel
 def test_curves_are_those_of_the_area_that_is_faced():
     force = pressed(2, 3.0, 5.2, mu=0.0, stiffness=CURVE).fields.resultant
     np.testing.assert_allclose(force[-1], -K * DEEP * (1 - SLID), rtol=1e-4)
+
+
+def dragged(first, last, **law):
+    """A block that ends within facets of a slab, pressed until 1 and dragged until 1.5."""
+    slab = am.box((4, 1), (4, 1), origin=(0, -1))
+    block = am.box((last - first, 1), (1, 1), origin=(first, 0.0))
+    stiff = am.NeoHookean(1e5, 0.0, density=1e-5)
+    contact = am.Contact("lower.top", master="upper.bottom", **law)
+    top = (lambda x, t: SLID * np.clip(t - 1, 0, 0.5) / 0.5, lambda x, t: -DEEP * min(t, 1.0))
+    bodies = [am.Body(slab, stiff, name="lower"), am.Body(block, stiff, name="upper")]
+    held = [am.Fix("lower.bottom", (0, 0)), am.Fix("upper.top", top)]
+    return am.Model(bodies, held, [contact])
+
+
+PRESSED = am.Fix("upper.top", (0, -DEEP))
+GIVEN = {"tresca": 0.1, "stiffness": K, "stick_stiffness": SLOPE}
+INERTIA = am.MoreauJean(0.1, mass_damping=10.0)
+
+
+@pytest.mark.parametrize(("first", "last", "method", "law"), [
+    (1.1, 2.3, am.QuasiStatic(0.5), GIVEN), (1.97, 3.2, am.QuasiStatic(0.5), GIVEN),
+    (1.1, 2.3, INERTIA, SPRINGS), (1.97, 3.2, INERTIA, GIVEN),
+    (1.1, 2.3, INERTIA, {**SPRINGS, "stiffness": CURVE})])  # fmt: skip
+def test_springs_are_those_of_all_that_neighbours_of_dropped_nodes_bear(
+    first, last, method, law
+):
+    """The share of a node that dropped out is their area; it does not stiffen springs."""
+    *_, step = am.evolve(dragged(first, last, **law), method, until=1.7)
+    fields, (pair,), area = step.fields, step.pairs.values(), last - first
+    np.testing.assert_allclose(fields.resultant[1], -K * DEEP * area, rtol=1e-4)
+    np.testing.assert_allclose(fields.resultant[0], SLOPE * SLID * area, rtol=1e-3)
+    touches = fields.status > 0
+    np.testing.assert_allclose(fields.pressure[touches], K * DEEP, rtol=1e-4)
+    np.testing.assert_allclose(abs(fields.force[:, 1]), fields.areas * fields.pressure,
+                               rtol=1e-3, atol=1e-9)  # fmt: skip
+    assert pair.area == pytest.approx(area, rel=1e-6)
+
+
+def test_springs_are_those_of_all_that_neighbours_of_held_nodes_bear():
+    """Nodes that supports hold have no force of their own, whatever the law."""
+    model = dragged(-0.5, 4.5, mu=0.0, stiffness=K)
+    ends = [am.Fix(f"lower.{side}", (0, 0)) for side in ("left", "right")]
+    found = am.solve(replace(model, supports=(model.supports[0], *ends, PRESSED)))
+    assert found.resultant.ravel()[1] == pytest.approx(-4 * K * DEEP, rel=1e-4)
+    np.testing.assert_allclose(found.pressure, K * DEEP, rtol=1e-4)
+
+
+@pytest.mark.parametrize(("dim", "order", "kind"), [(2, 1, None), (2, 2, None), (3, 1, "tet")])
+def test_tangents_where_nodes_drop_out_are_exact(dim, order, kind):
+    """A block over the middle of facets, under a given bound and on springs."""
+    wide, mid, rng = (1,) * (dim - 2), (0,) * (dim - 2), np.random.default_rng(3)
+    slab = am.box((2, *wide, 1), (4, *(2,) * (dim - 1)), origin=(0, *mid, -1), kind=kind)
+    block = am.box((0.6, *(0.6,) * (dim - 2), 0.5), (2, *(2,) * (dim - 2), 1),
+                   origin=(0.55, *(0.35,) * (dim - 2), -0.02))  # fmt: skip
+    bodies = [am.Body(slab, SOFT, name="lower", order=order),
+              am.Body(block, SOFT, name="upper", order=order)]  # fmt: skip
+    contact = am.Contact("lower.top", master="upper.bottom", tresca=0.01, stiffness=1.0)
+    held = [am.Fix("lower.bottom", 0), am.Fix("upper.top", 0)]
+    model = am.Model(bodies, held, [contact])
+    parts = large_deformation(model).parts
+    before = 0.01 * rng.standard_normal(parts.X.size)
+    assert parts.meet(before.reshape(parts.X.shape)).passed.max() > 1.05
+    problem = large_step(model, np.zeros(parts.X.size), np.zeros(parts.X.size), before)
+    draws = (rng.standard_normal((2, problem.unknowns)) * [[0.01], [1.0]] for _ in range(3))
+    assert checked_tangents(problem, draws) > 1
+
+
+@pytest.mark.parametrize(("first", "last", "law"), [(1.1, 2.3, SPRINGS), (1.97, 3.2, GIVEN)])
+def test_springs_keep_their_stresses_where_inertia_ends(first, last, law):
+    """A node that had dropped out, and its neighbours, go on without a jump."""
+    model = dragged(first, last, **law)
+    *_, moving = am.evolve(model, INERTIA, until=1.7)
+    *_, still = am.evolve(model, am.QuasiStatic(0.1), until=1.8, start=moving.state)
+    np.testing.assert_allclose(still.fields.resultant, moving.fields.resultant, rtol=3e-4)
 
 
 def floor(dim, order, **law):

@@ -65,6 +65,7 @@ def test_slopes_are_exact_at_random_states(left_out, far):
             continue
         force = rng.standard_normal((len(here.met), 2)) * here.met[:, None]
         assert (here.met & ~earlier.met).any() == bool(far)
+        assert (here.passed > 1.1).any() == (left_out is not None)
         slopes = here.slopes
         found = [one @ way.ravel() for one in (
             slopes.normals, slopes.distances, slopes.gap, slopes.spread(force),
@@ -87,7 +88,7 @@ def test_forces_balance_and_rotations_are_no_slip():
     force = rng.standard_normal((len(here.met), 2)) * here.met[:, None]
     spread = here.averages.T @ force
     assert np.abs(spread.sum(axis=0)).max() < 1e-14
-    moment = moments(x, spread) - moments(here.distances, force)
+    moment = moments(x, spread) - moments(here.distances, here.passed[:, None] * force)
     assert abs(moment) < 1e-14
     couples = (here.couples.matrix @ force.ravel()).reshape(x.shape)
     assert np.abs(couples.sum(axis=0)).max() < 1e-14

@@ -139,7 +139,8 @@ def test_forces_balance_and_rotations_change_nothing(dim, kinds, serendipity, or
     force = rng.standard_normal((len(here.met), dim)) * here.met[:, None]
     spread = here.averages.T @ force
     assert np.abs(spread.sum(axis=0)).max() < 1e-13
-    moments = [np.einsum("pi,pj->ij", *both) for both in ((x, spread), (here.distances, force))]
+    far = here.distances * here.passed[:, None]
+    moments = [np.einsum("pi,pj->ij", *both) for both in ((x, spread), (far, force))]
     moments = [arm - arm.T for arm in moments]
     assert np.abs(moments[0] - moments[1]).max() < 1e-13
     couples = (here.couples.matrix @ force.ravel()).reshape(x.shape)

@@ -118,7 +118,8 @@ def test_a_bond_gives_way_by_force_over_stiffness():
     assert abs(last.energies.defect) < 1e-3 * last.energies.turnover
 
 
-@pytest.mark.parametrize(("first", "last", "longer"), [(0.0, 2.0, 1.5), (0.5, 1.5, 1.0)])
+@pytest.mark.parametrize(("first", "last", "longer"), [
+    (0.0, 2.0, 1.5), (0.5, 1.5, 1.0), (0.55, 1.15, 1.0)])  # fmt: skip  # some drop out
 def test_a_bond_acts_on_what_the_sides_share(first, last, longer):
     """Two slabs that are made longer, and a block on half of its last nodes."""
     stiff, long = am.NeoHookean(1e5, 0.0), last - first

@@ -12,7 +12,8 @@ sum_j x_j x T_pj lambda_p = (T x)_p x lambda_p ([P]: there the mesh is moved unt
 c is that of least squares, on p and nodes off the slave's surface, so that the force on p is
 still that of p alone; rows are scaled to T_pp = 1.
 
-An elastic bond has T x = -C lambda in the place of T x = 0, normal and tangential.
+An elastic bond has T x = -pi C lambda in the place of T x = 0, normal and tangential, pi of
+`current_mortar`: how much of lambda the slave's side gets, whose mean distance is T x / pi.
 
 [P] M. Puso, "A 3D mortar method for solid mechanics", Int. J. Numer. Meth. Engng 59 (2004).
 """
@@ -168,8 +169,8 @@ class TiedMeeting:
 
     @cached_property
     def distances(self) -> Array:
-        """T x, (nc, d): zero but for what bonds give way."""
-        return self.pair.rows @ self.x
+        """T x over `passed`, the mean, (nc, d): zero but for what bonds give way."""
+        return self.pair.rows @ self.x / self.passed[:, None]
 
     @property
     def gap(self) -> Array:
@@ -177,7 +178,7 @@ class TiedMeeting:
         return (self.normals * self.distances).sum(axis=1)
 
     def motion(self, _: object) -> Array:
-        """T x, (nc, d), of whichever step: it counts from the undeformed state."""
+        """`distances`, of whichever step: they count from the undeformed state."""
         return self.distances
 
     @cached_property
@@ -198,9 +199,10 @@ class TiedSlopes:
         return self.at._surface.slopes.normals
 
     def motion(self, _: object) -> sparse.csr_array:
-        """d(T x)/dx, (nc d, nodes d)."""
+        """Of the distances, (nc d, nodes d)."""
         eye = sparse.eye_array(self.at.x.shape[1])
-        return sparse.csr_array(sparse.kron(self.at.averages, eye))
+        means = sparse.diags_array(1 / self.at.passed) @ self.at.averages
+        return sparse.csr_array(sparse.kron(means, eye))
 
     @property
     def gap(self) -> sparse.csr_array:

@@ -8,13 +8,14 @@ slave facet psi are the dual functions of `dual` on that part of it that faces t
 ([PSG]), D_p = int psi_p over all facets, and
 
     B_pp = 1,   B_pq = - int psi_p N_q / D_p  of master nodes q,   sum_j B_pj = 0,         (1)
-    G_p = sum_j B_pj x_j,      g_p = n_p . G_p,                                             (2)
-    s_p = sum_j B'_pj x_j - G_p,                                                            (3)
+    G_p = sum_j B_pj x_j / pi_p,      g_p = n_p . G_p,                                      (2)
+    s_p = sum_j B'_pj x_j / pi'_p - G_p,                                                    (3)
 
-G the distance vector, g the gap, and s the motion since the last step, whose B is B' ([PL]):
+pi_p = int psi_p / D_p, G the mean distance vector, g the gap, and s the motion since the last
+step, whose B is B' ([PL]):
 what slides is the change of B, not of x.  Rotations of everything leave B as it is: s = 0.
 A force lambda_p acts on p, and -B_pj lambda_p on the other nodes j: together no force, and a
-moment G_p x lambda_p, none where the sides touch all along, which `couples` take away.
+moment pi_p G_p x lambda_p, none where the sides touch all along, which `couples` take away.
 A node that met nobody at the end of the last step has the motion of `newcomers`, one that faded
 then some of both; one that meets nobody now has none.  One that was open then, by g' > 0, met
 the point over there along its normal n', but both sides turn towards each other until they
@@ -22,15 +23,15 @@ touch: they come closer without a slip along the mean of n' and the master's nor
 the point d beside that one,
 
     d_p = g' (n' - m (n' . n_M) / (m . n_M)) = sum_j A'_pj x'_j,    m = n' + n_M,
-    s_p = sum_j (B' - (1 - g_p / g') A')_pj x_j - G_p,                                    (3')
+    s_p = sum_j (B' - (1 - g_p / g') A')_pj x_j / pi'_p - G_p,                            (3')
 
 A' on master nodes by gradients of their functions.  With (3) alone slips of nodes that close
 have errors of first order in the load step, opposite for both sides as slaves.
 
 Nodes without a row carry no force of their own: the others of their facets take their share,
-and B_ps > 0 at such a node s ([PW]).  Nodes of which hardly anything faces the master get the
-mean pressure of their neighbours, see `fading`; in dynamics and ties, where who carries stays
-for a step or for good, and under a given bound they are like nodes without a row.
+pi > 1 and B_ps > 0 at such a node s ([PW]).  Nodes of which hardly anything faces the master
+get the mean pressure of their neighbours, see `fading`; in dynamics and ties, where who carries
+stays for a step or for good, and under a given bound they are like nodes without a row.
 A node that does not meet is open, its gap the distance from the closest master node.
 
 Facets of second order have multipliers at their corners, psi dual to the functions of first
@@ -260,12 +261,16 @@ class MortarMeeting:
 
     @cached_property
     def passed(self) -> Array:
-        """How much of lambda_p all nodes of the slave side get, (nc,): more beside an edge.
+        """pi, how much of lambda_p all nodes of the slave side get, (nc,): more beside an edge.
 
         There nodes without a force of their own leave their share to others.
         """
-        onto_master = self.averages[:, self.pair.master.every].sum(axis=1)
-        return np.where(self.met, -np.asarray(onto_master).ravel(), 1.0)
+        if not self.shared.leaving.any():
+            return np.ones(len(self.slaves))
+        parts, row = self.shared, self.rows
+        borne = (parts.psi @ parts.mass.sum(axis=2)[:, :, None])[:, :, 0]
+        borne = np.bincount(row[row >= 0], borne[row >= 0], minlength=len(self.slaves))
+        return np.where(self.met, borne * self.by_weight, 1.0)
 
     @property
     def met_averages(self) -> sparse.csr_array:
@@ -311,7 +316,8 @@ class MortarMeeting:
         there = np.where((row >= 0)[:, :, None], (self.by_weight[:, None] * beside)[row], 0.0)
         slopes = master.gradients(self.x, parts.master)
         moved = share[:, :, None] * (there @ slopes.swapaxes(1, 2))
-        return sum_of_blocks([(moved, row, master.nodes[parts.master])], shape)
+        found = sum_of_blocks([(moved, row, master.nodes[parts.master])], shape)
+        return sparse.csr_array(sparse.diags_array(1 / self.passed) @ found)
 
     @cached_property
     def by_opening(self) -> Array:
@@ -344,7 +350,7 @@ class MortarMeeting:
     @cached_property
     def distances(self) -> Array:
         """G, (nc, d)."""
-        return self.references @ self.x
+        return self.references @ self.x / self.passed[:, None]
 
     @cached_property
     def gap(self) -> Array:
@@ -355,7 +361,7 @@ class MortarMeeting:
     def motion(self, earlier: MortarMeeting) -> Array:
         """s of (3), (nc, d), since `earlier`, at the end of the last step; 0 of the lone."""
         known = (self.met * earlier.remembered)[:, None]
-        out = earlier.averages @ self.x - self.distances
+        out = earlier.averages @ self.x / earlier.passed[:, None] - self.distances
         if earlier.approach.nnz:
             out -= self.closed_by(earlier)[:, None] * (earlier.approach @ self.x)
         out = np.where(known > 0, known * out, 0.0)

@@ -277,7 +277,7 @@ class Meetings:
         return sparse.csr_array(sparse.block_diag(blocks, format="csr"))
 
     def distances(self) -> Array:
-        """T x of ties, (nc, d); zero of others."""
+        """Mean distances of ties, (nc, d); zero of others."""
         return np.concatenate([
             part.distances if isinstance(part, TiedMeeting) else np.zeros_like(part.normals)
             for part in self.parts

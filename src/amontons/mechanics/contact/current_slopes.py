@@ -76,7 +76,7 @@ class MortarSlopes:
     ) -> sparse.csr_array:
         """Derivative of by_normal n + by_distance G + by_motion s, (nc m, nodes d).
 
-        All factors (nc, m, d); that of G of nodes that meet.
+        All factors (nc, m, d); that of G, the mean distance, of nodes that meet.
         """
         newcomers = self.at.newcomers(earlier)
         entries = [] if newcomers is None else newcomers.entries(by_motion)
@@ -90,8 +90,8 @@ class MortarSlopes:
             by_normal = by_normal + by_gap * self.at.distances[:, None]
             by_distance = by_distance + by_gap * self.at.normals[:, None]
         entries += [*(part.times(by_normal) for part in self.at.facing.slopes),
-                    *self.by_distances(by_distance),
-                    averaged(earlier.averages, by_motion)]  # fmt: skip
+                    *self._by_means(by_distance),
+                    averaged(earlier.averages, by_motion / earlier.passed[:, None, None])]
         nc, m = by_normal.shape[:2]
         return sum_of_blocks(entries, (nc * m, self.at.x.size))
 
@@ -117,8 +117,16 @@ class MortarSlopes:
         """dG/dx, (nc d, nodes d), of nodes that meet; zero for the others."""
         return self._alone(by_distance=self._eyes)
 
-    def by_distances(self, factors: Array) -> list[Blocks]:
+    def _by_means(self, factors: Array) -> list[Blocks]:
         """Entries of factors (nc, m, d) times dG/dx, (nc m, nodes d), of nodes that meet."""
+        if not self.at.shared.leaving.any():
+            return self.by_distances(factors)
+        factors = factors / self.at.passed[:, None, None]
+        grown = factors @ self.at.distances[:, :, None]
+        return [*self.by_distances(factors), self._passed.times(-grown)]
+
+    def by_distances(self, factors: Array) -> list[Blocks]:
+        """The same of pi G."""
         return [self._distances.times(factors), averaged(self.at.met_averages, factors)]
 
     @property
@@ -168,7 +176,7 @@ class MortarSlopes:
 
     @cached_property
     def _distances(self) -> SlotSlopes:
-        """Of G by the integrals, a part per pair of facets; B is held."""
+        """Of pi G by the integrals, a part per pair of facets; B is held."""
         parts, pair, d = self.at.shared, self.at.pair, self.at.x.shape[1]
         at, there = self._bulges.places
         theta = parts.blend[0][:, None, None]
@@ -179,7 +187,8 @@ class MortarSlopes:
         kept, psi, row = parts.kept, parts.psi, self.at.rows
         y = np.where(kept[:, :, None], parts.inverse @ h, 0.0)
         scale = np.where(kept, self.at.by_weight[row], 0.0)
-        apart = y - np.where(kept[:, :, None], self.at.distances[row], 0.0)
+        apart = self.at.distances * self.at.passed[:, None]
+        apart = y - np.where(kept[:, :, None], apart[row], 0.0)
         apart = apart * scale[:, :, None]
         a, scaled = psi.shape[1], psi * scale[:, :, None]
         # by own_rt, where the first a of t are mass_rt, of all r: psi_pr times (t, c)
@@ -194,6 +203,21 @@ class MortarSlopes:
         if self.at.has_bulges:
             values += scale[parts.of][:, :, None, None] * self._bulges.distances()
         return SlotSlopes(values, row[parts.of], dofs)
+
+    @cached_property
+    def _passed(self) -> SlotSlopes:
+        """Of pi: (1) for h = int phi, which has y = 1 but where nodes leave their share."""
+        parts, kept, row = self.at.shared, self.at.shared.kept, self.at.rows
+        y = np.where(kept, (parts.inverse @ parts.mass.sum(axis=2)[:, :, None])[:, :, 0], 0.0)
+        scale = np.where(kept, self.at.by_weight[row], 0.0)
+        real = self.at.pair.slave.real[parts.facets]
+        own, _, dofs = self.integrals
+        mass = own[:, :, : kept.shape[1]]
+        moved = ((1 - y) * real)[parts.of][:, None, None] @ mass  # (k, r, 1, w)
+        values = (parts.psi * scale[:, :, None])[parts.of] @ moved[:, :, 0]
+        more = (y - np.where(kept, self.at.passed[row], 0.0)) * scale
+        values += more[parts.of][:, :, None] * mass.sum(axis=2)
+        return SlotSlopes(values[:, :, None], row[parts.of], dofs)
 
     def pushed(self, force: Array) -> sparse.csr_array:
         """Derivative of all forces by x, (nodes d, nodes d); force (nc, d): lambda, held."""

@@ -109,6 +109,12 @@ class Shared:
         return cls(of, other, facets, numbers, total, cross, psi, kept, even, covered, opposed,
                    cut)  # fmt: skip
 
+    @cached_property
+    def leaving(self) -> Mask:
+        """Slots (f, a) of nodes that leave their share to others."""
+        borne = np.asarray(self.kept.any(axis=1))[:, None]
+        return ~self.kept & (self.mass.sum(axis=2) > 0) & borne
+
     @property
     def mass(self) -> Array:
         """int phi phi, (f, a, a)."""

@@ -46,6 +46,12 @@ class Faced:
         areas, passed = weights * meeting.stretch, meeting.passed
         return cls(areas, passed, tuple(_each(meeting, force)))
 
+    @classmethod
+    def whole(cls, meeting: Meetings, weights: Array, force: Array) -> Faced:
+        """The same with force (nc, d): those of all nodes of the slave's side."""
+        told = cls.of(meeting, weights, force / meeting.passed[:, None])
+        return cls(told.areas * told.passed, np.ones_like(told.passed), told.onto)
+
 
 def _each(meeting: Meetings, force: Array) -> Iterator[Onto | None]:
     start = 0

@@ -165,16 +165,18 @@ class _Step:
         parts = parts.divided(q0.reshape(shape)) if parts.folds else parts
         self.parts = parts
         start = parts.meet(q0.reshape(shape))
-        meeting = parts.meet((q0 + h / 2 * v0).reshape(shape))
-        self.meeting = meeting
-        self.H = sparse.csc_array(meeting.columns(meeting.frames))
+        self.meeting = meeting = parts.meet((q0 + h / 2 * v0).reshape(shape))
+        # forces on all of the slave's side, and mean motions, where nodes leave their share
+        self._axes = meeting.frames / meeting.passed[:, None, None]
+        self.H = sparse.csc_array(meeting.columns(self._axes))
         u0 = self.local(v0)
         closing = start.gap + method.prediction * h * u0[:, 0] <= model._closed
         springs, tied = model.springs, motion.body.law.tied
         self.active = np.flatnonzero((closing | springs.presses | tied) & meeting.met)
         stressed = motion.body.law.has_stresses
-        self.growth = meeting.growth if stressed else np.zeros(0)
-        law, self.springs = model.springs_on(self.growth)
+        whole = meeting.growth * meeting.passed
+        self.growth = whole if stressed else np.zeros(0)
+        law, self.springs = model.springs_on(whole)
         self.law = self.springs.of_impulses(law, h, method.theta).at(self.active)
         # forces that draw springs as far on the areas of now as those before did on theirs
         grown = self.growth / state.growth if state.growth.size else self.growth
@@ -221,7 +223,7 @@ class _Step:
         here = self.meeting.turned(self.parts.X + q.reshape(self.parts.X.shape))
         assert here is not None
         nc, d = self._before.shape
-        axes = (self.meeting.frames.swapaxes(1, 2), np.arange(nc), np.arange(nc + 1))
+        axes = (self._axes.swapaxes(1, 2), np.arange(nc), np.arange(nc + 1))
         axes = sparse.csc_array(sparse.bsr_array(axes, shape=(nc * d, nc * d)))
         columns = (self.active[:, None] * d + np.arange(d)).ravel()
         return sparse.csr_array((here - self.meeting.turned_here) @ axes[:, columns])
@@ -395,4 +397,4 @@ class _Step:
         load = self.load.at(((state.displacement + q1) / 2).reshape(m.parts.X.shape))
         return TimeStep(m.motion.body, new, solution, self.active, energies, meeting.gap,
                         support_forces(m._all, held / h), load, meeting.frames,
-                        faced=Faced.of(self.meeting, m._all.sites.weights, force))  # fmt: skip
+                        faced=Faced.whole(self.meeting, m._all.sites.weights, force))

@@ -68,6 +68,7 @@ class LargeSlowModel:
         q0 = state.displacement
         body = self.motion.body
         body = body.divided(q0) if nonlinear_parts(body).folds else body
+        state = self._on_areas(body, state)
         drawn = self._drawn(body, state)
         problem = large_step(body, load, prescribed, q0, self._known(state), drawn)
         force = np.einsum("pk,pkc->pc", state.force, problem.earlier.frames)
@@ -97,7 +98,9 @@ class LargeSlowModel:
             slid = way + self._stretched(body, q1, solution.r)
             slid -= self._stretched(body, q0, state.force)
         way, slid = np.where(tied, 0.0, way), np.where(tied, 0.0, slid)
-        work = quasi_static_friction(state.force[:, 1:], solution.r[:, 1:], slid)
+        both = zip((state.force, solution.r), (problem.earlier, meeting), strict=True)
+        rubs = [r[:, 1:] * there.passed[:, None] for r, there in both]
+        work = quasi_static_friction(*rubs, slid)
         acting = self._forces(body, q1, load, solution.r)
         energies = self._energies(body, state, q1, load, acting, float(work.sum()))
         passed = time - state.time
@@ -114,6 +117,27 @@ class LargeSlowModel:
         return TimeStep(body, new, solution, active, energies, solution.u[:, 0],
                         support_forces(self.motion.parts, rest), acting.load, axes,
                         passage, faced)  # fmt: skip
+
+    def _on_areas(self, body: Model, state: State) -> State:
+        """The state with forces that have its stresses on the areas where it ends.
+
+        Those of a step with inertia had its areas, halfway, and nodes that `fading` knows may
+        have dropped out of it: they get the mean that it has for them.
+        """
+        if not state.growth.size:
+            return state
+        parts = nonlinear_parts(body)
+        meeting = parts.meet(state.displacement.reshape(parts.X.shape))
+        growth = meeting.growth
+        if (growth == state.growth).all():
+            return state
+        force = state.force * (growth / state.growth)[:, None]
+        lost = (state.growth == 1) & ~force.any(axis=1)
+        if lost.any():
+            axes = meeting.frames
+            mean = meeting.shares @ np.einsum("pkc,pk->pc", axes, force)
+            force += lost[:, None] * np.einsum("pkc,pc->pk", axes, mean)
+        return replace(state, force=force, growth=growth)
 
     def _drawn(self, body: Model, state: State) -> Array | None:
         """How far springs along the surface are drawn, (nc, d-1); None without any."""
@@ -171,7 +195,9 @@ class LargeSlowModel:
         moved = q.reshape(parts.X.shape)
         meeting = parts.meet(moved)
         pushed = meeting.pushed(meeting.frames, r)
-        stored = Springs.of(parts.contact.over(meeting).law, r.shape[1]).energy(r)
+        # of all forces on the slave's side, on all of its area
+        law, shared = parts.contact.over(meeting).law, meeting.passed
+        stored = Springs.of(law.scaled(shared), r.shape[1]).energy(r * shared[:, None])
         return Forces(parts.forces(moved), load.at(moved), pushed, parts.energy(moved), stored)
 
 

@@ -44,7 +44,8 @@ class State(KeepsLocks):
     """All that the next step needs: it may be saved, and the evolution goes on from it.
 
     index: steps done; time; displacement, velocity (dofs,) of all bodies one after another;
-    force (nc, d): contact forces on the slaves in the local frames, zero where none is active;
+    force (nc, d): contact forces on the slaves in the local frames, zero where none is active,
+    after large deformations with inertia with the share of nodes that have dropped out;
     slip (nc, d-1): tangential displacement since the start.  What no step needs, zero where
     it is not given: slid (nc, d-1), what the contacts have slid, net; path (nc,), the length of
     that way; friction_work (nc,), the energy that it took.  plastic (h,): the history of bodies
