@@ -32,7 +32,7 @@ from numba.core.types import BooleanLiteral, IntegerLiteral, unliteral
 
 from .source_digest import PACKAGE, Stamp, as_imported, imported, sources
 
-MARK = b"njit("  # in every file with kernels
+MARKS = (b"njit(", b"numba.extending")  # one of them is in every file with parts of kernels
 ROOT = 0  # whose folders anybody may trust
 STRANGE = f"numba {numba.__version__} is not one that kernels in the package can be read with"
 PATIENCE = 30 * 24 * 3600.0  # seconds after which kernels of another version may go
@@ -174,7 +174,7 @@ def _forget_old(above: Path) -> None:
 
 def _digest() -> str:
     """Sixteen letters that change with any file that holds kernels, and with constants."""
-    return sources(PACKAGE, MARK, _read)
+    return sources(PACKAGE, MARKS, _read)
 
 
 def is_current() -> bool:

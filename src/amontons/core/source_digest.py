@@ -15,8 +15,10 @@ Stamp = tuple[str, int, int]  # name, time of the last change, size
 _imported: dict[str, Stamp] = {}  # files of kernels when they were imported, by their paths
 
 
-def sources(package: Path = PACKAGE, mark: bytes = b"", read: set[Stamp] | None = None) -> str:
-    """Sixteen letters that change with any file of the package that has this mark in it.
+def sources(
+    package: Path = PACKAGE, marks: tuple[bytes, ...] = (b"",), read: set[Stamp] | None = None
+) -> str:
+    """Sixteen letters that change with any file of the package that has one of the marks in it.
 
     And with what looks like a constant in any other one.  read: is told what was read.
     """
@@ -28,7 +30,7 @@ def sources(package: Path = PACKAGE, mark: bytes = b"", read: set[Stamp] | None 
             if read is not None:
                 read.add(_stamp(path, os.fstat(file.fileno())))
             text = file.read().replace(b"\r\n", b"\n")
-        if mark not in text:
+        if not any(mark in text for mark in marks):
             text = b"\n".join(CONSTANT.findall(text))
         if text:
             name = os.path.relpath(path, above).replace(os.sep, "/")

@@ -16,7 +16,6 @@ from llvmlite import ir
 from numba.core import cgutils, config, types
 from numba.extending import intrinsic
 
-# The text of this file is part of kernels that call it; "njit(" lets `core.source_digest` know.
 LANES, BYTES = 4, 8
 DOUBLE, LONG, INT = ir.DoubleType(), ir.IntType(64), ir.IntType(32)
 FOUR = ir.VectorType(DOUBLE, LANES)

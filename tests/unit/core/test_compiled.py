@@ -126,13 +126,27 @@ def taken_by_kernels(path):
 def test_what_kernels_take_from_files_without_kernels_is_in_the_digest():
     checked = 0
     for path in PACKAGE.rglob("*.py"):
-        for file, name in taken_by_kernels(path) if compiled.MARK in path.read_bytes() else ():
+        for file, name in taken_by_kernels(path) if marked(path.read_bytes()) else ():
             text = file.read_bytes()
-            if compiled.MARK not in text:
+            if not marked(text):
                 lines = source_digest.CONSTANT.findall(text)
                 assert any(name in line.split(b"=")[0] for line in lines), (path, name)
                 checked += 1
     assert checked > 10
+
+
+def marked(text):
+    return any(mark in text for mark in compiled.MARKS)
+
+
+def test_files_of_intrinsics_are_read_whole(tmp_path):
+    """They are parts of kernels though they hold none."""
+    path = tmp_path / "products.py"
+    digests, first = [], "from numba.extending import intrinsic\n"
+    for body in ("1", "2"):
+        path.write_text(f"{first}def product(): return {body}\n")
+        digests.append(source_digest.sources(tmp_path, compiled.MARKS))
+    assert digests[0] != digests[1]
 
 
 def test_a_file_that_changed_after_its_import_is_noticed(tmp_path, monkeypatch):
