@@ -199,7 +199,10 @@ class _Average:
         kept = nodes_with_multiplier(nodes, real, held, reached < HARDLY, reached)
         psi = dual_functions(mass, kept[nodes] & real, real)
         chosen = np.unique(nodes[kept[nodes] & real])
-        weights = _scatter(n, nodes, np.einsum("faa->fa", psi @ mass))[chosen]
+        own_part = _scatter(n, nodes, np.einsum("faa->fa", psi @ mass))[chosen]
+        left = (real & ~kept[nodes]).astype(float)  # nodes without multiplier
+        shared = _scatter(n, nodes, (psi @ mass @ left[:, :, None])[:, :, 0])
+        weights = own_part + shared[chosen]
         if own is not None:
             product = _between(nodes, psi @ own, surface.all[facets], (n, n))[chosen]
             onto = _cleaned(product, weights)
@@ -207,7 +210,7 @@ class _Average:
         product = _between(nodes, psi @ mass, nodes, (n, n))[chosen]
         extra = product @ sparse.diags_array(np.where(kept, 0.0, 1.0))
         itself = sparse.csr_array(
-            (np.ones(len(chosen)), (np.arange(len(chosen)), chosen)), shape=(len(chosen), n)
+            (own_part / weights, (np.arange(len(chosen)), chosen)), shape=(len(chosen), n)
         )
         return cls(surface, facets, mass, chosen, weights, psi,
                    itself + _cleaned(extra, weights))  # fmt: skip
