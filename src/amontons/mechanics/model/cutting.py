@@ -54,7 +54,8 @@ class Contacts:
 
     frames (k, d, d): by rows, tangents turned to what supports hold; turn (k, d, d): from
     there to the frame of the model; able (k, d): directions that no support holds; part (k,):
-    1 over that of forces of the model's that the slave node bears itself, see `mortar`.
+    1 over what the slave node bears itself of the model's forces, see `contact.mortar`.  Here
+    forces are those, and u and gap in proportion, part times those of the model.
     """
 
     number: Index

@@ -153,7 +153,7 @@ class DistributedSolution:
         moved = self._at_local(self.displacement)
         force = np.zeros_like(self.displacement)
         contacts = share.contacts
-        local = np.einsum("kba,kb->ka", contacts.turn, self.r / contacts.part[:, None])
+        local = np.einsum("kba,kb->ka", contacts.turn, self.r)
         force[contacts.node] = np.einsum("kab,ka->kb", contacts.frames, local)
         status = np.zeros((len(force), 1))
         status[contacts.node, 0] = self.status
