@@ -25,7 +25,7 @@ from ..linear.blocks import (
     spatial,
     velocity_inplace,
 )
-from . import indefinite
+from . import indefinite, residuals
 from .judge import measures as judge
 from .judge.contacts import Assessed, assessed
 from .judge.measures import Measure, Weakest
@@ -170,7 +170,7 @@ class Equations(Matrices):
         if v is not None:
             self._check_motion(v)
         if self.measure is Measure.EXACT:
-            error = self.condensed()._exact_error(r)
+            error = residuals.exact(self.condensed(), r)
             return error if v is None else max(error, self.imbalance(r, v))
         if v is None:
             try:
@@ -178,7 +178,7 @@ class Equations(Matrices):
             except SingularOperator:
                 return np.inf
         assert v is not None
-        return self._residual_error(r, v)
+        return residuals.residual(self, r, v)
 
     @of_plain
     def rounding(self, r: Array) -> float:
@@ -311,41 +311,11 @@ class Equations(Matrices):
     @of_plain
     def exact_error(self, r: Array) -> float:
         """The exact measure of the Delassus form."""
-        return self._exact_error(r)
-
-    def _exact_error(self, r: Array) -> float:
-        rows = kernel_rows(r)
-        if self.q_norm == 0:
-            return 0.0 if not rows.any() else np.inf
-        return judge.natural_error(*self.product_data, rows) / self.q_norm
-
-    @np.errstate(over="ignore", invalid="ignore")
-    def _residual_error(self, r: Array, v: Array) -> float:
-        motion = kernel_rows(r), kernel_rows(self.local_velocity(v))
-        law = np.inf
-        if all(np.isfinite(part).all() for part in motion):
-            law = judge.error_of_motion(self.law.kind, self.law.parameters, self.rho, *motion)
-        error = max(
-            self.imbalance(r, v), judge.ratio(law, self.scales[1]), self.unbalanced(r)
-        )
-        return float(error) if np.isfinite(error) else np.inf
+        return residuals.exact(self, r)
 
     def unbalanced(self, r: Array) -> float:
-        """Largest force that moves a loose body as a whole, relative to those on it.
-
-        A loose body is one that contact alone holds; 0 where there is none, and in the Delassus
-        form, which has none.
-        """
-        modes = self.matrices.balanced_modes if self.loose_modes.shape[1] else self.loose_modes
-        if modes.shape[1] == 0:
-            return 0.0
-        assert self.f is not None and self.H is not None
-        load = modes.T @ self.f
-        pushes = (self.H.T @ modes).reshape(*r.shape, modes.shape[1]) * r[:, :, None]
-        least = judge.FLOOR * judge.EPSILON * (np.abs(modes).T @ np.abs(self.f))
-        size = np.abs(load) + np.abs(pushes).sum(axis=(0, 1)) + least
-        rest = np.abs(load + pushes.sum(axis=(0, 1)))
-        return float(np.divide(rest, size, out=np.zeros_like(rest), where=size > 0).max())
+        """Largest force that moves a loose body as a whole, see `residuals.unbalanced`."""
+        return residuals.unbalanced(self, r)
 
     @cached_property
     def loose_modes(self) -> Array:

@@ -1,11 +1,13 @@
 """The basis in which contact between bodies looks like contact with an obstacle.
 
 Where every contact couples the displacements of one slave node of its own, through an
-orthonormal block, with those of other nodes (closest points or dual mortar),
+orthonormal block and a number, with those of other nodes (closest points or dual mortar),
 
-    u = R v_s + B v_m + w,    v_s = vhat_s + C v_m  with  C = -R^T B    =>    u = R vhat_s + w.
+    u = a R v_s + B v_m + w,    v_s = vhat_s + C v_m  with  C = -R^T B / a
+    =>    u = a R vhat_s + w.
 
-In this basis of [HSW] section 2, v = T vhat, the problem reads
+a is 1 but where others leave their share to a node, see `mechanics.contact.mortar`.  In this
+basis of [HSW] section 2, v = T vhat, the problem reads
 
     T' M T vhat = T' H r + T' f,    T' H having the slave blocks only.
 
@@ -41,10 +43,10 @@ class OneSided:
 
         u = frames @ vhat[dofs] + w,    r acts on vhat[dofs] as frames' r,
 
-    with a column of zeros where dofs is -1; the other columns are orthonormal.  H (n, nc d):
-    T' H.  levels: the problem's, with T^-1 levels[0].  near_nullspace: T^-1 of the problem's.
-    coupling (n, n): S C, so that T = I + S C and T^-1 = I - S C; None where T is the identity,
-    and then all arrays are those of the problem, not copies.
+    with a column of zeros where dofs is -1; others are orthogonal, of length scale (nc,).
+    H (n, nc d): T' H.  levels: the problem's, with T^-1 levels[0].  near_nullspace: T^-1 of the
+    problem's.  coupling (n, n): S C, so that T = I + S C and T^-1 = I - S C; None where T is
+    the identity, and then all arrays are those of the problem, not copies.
     """
 
     M: sparse.csc_array
@@ -52,9 +54,20 @@ class OneSided:
     f: Array
     dofs: Index
     frames: Array
+    scale: Array
     levels: tuple[sparse.csr_array, ...] = ()
     near_nullspace: Array | None = None
     coupling: sparse.csr_array | None = None
+
+    @property
+    def axes(self) -> Array:
+        """Frames with columns of length 1, (nc, d, d)."""
+        return self.frames / self.scale[:, None, None]
+
+    @property
+    def inverse(self) -> Array:
+        """A (nc, d, d) such that r = A @ (force on vhat[dofs]), vhat[dofs] = A' (u - w)."""
+        return self.axes / self.scale[:, None, None]
 
     def to_displacement(self, vhat: Array) -> Array:
         """v = T vhat, (n,) or (n, k)."""
@@ -81,9 +94,9 @@ def one_sided(problem: FrictionProblem) -> OneSided | None:
     basis = problem.kept(_basis)
     if basis is None:
         return None
-    M, H, dofs, frames, coupling = basis
+    M, H, dofs, frames, scale, coupling = basis
     assert problem.f is not None
-    plain = OneSided(M, H, problem.f, dofs, frames, problem.levels,
+    plain = OneSided(M, H, problem.f, dofs, frames, scale, problem.levels,
                      problem.near_nullspace, coupling)  # fmt: skip
     if coupling is None:
         return plain
@@ -94,11 +107,11 @@ def one_sided(problem: FrictionProblem) -> OneSided | None:
     if modes is not None:
         modes = plain.from_displacement(modes)
     f = plain.to_load(problem.f)
-    return OneSided(M, H, f, dofs, frames, levels, modes, coupling)
+    return OneSided(M, H, f, dofs, frames, scale, levels, modes, coupling)
 
 
 def _basis(problem: FrictionProblem) -> tuple | None:
-    """(T' M T, T' H, dofs, frames, S C or None), or None where H has not the structure.
+    """(T' M T, T' H, dofs, frames, scale, S C or None), or None where H has not the structure.
 
     The slaves are those of the model; where they do not do, or are not known, they are looked
     for in H: of equal meshes either side will do.
@@ -114,17 +127,18 @@ def _basis_of(problem: FrictionProblem, structure: Structure | None) -> tuple | 
     assert M is not None and problem.H is not None
     H = sparse.csr_array(problem.H, copy=True)
     H.eliminate_zeros()
-    dofs, frames = slave_dofs(M, H, d, structure)
+    dofs, frames, scale = slave_dofs(M, H, d, structure)
     own = np.zeros(H.shape[0])
     own[dofs[dofs != HELD]] = 1.0
     others = sparse.csr_array(sparse.diags_array(1 - own) @ H)
     others.eliminate_zeros()
     if not others.nnz:
-        return M, problem.H, dofs, frames, None
+        return M, problem.H, dofs, frames, scale, None
     tiles = sparse.bsr_array(
         (frames, np.arange(nc), np.arange(nc + 1)), shape=(nc * d, nc * d)
     ).tocsr()  # columns: slots of dofs
-    onto_slaves = sparse.csr_array(others @ tiles)
+    squared = np.repeat(scale**2, d)
+    onto_slaves = sparse.csr_array(others @ tiles @ sparse.diags_array(1 / squared))
     missed = others - onto_slaves @ tiles.T
     if missed.nnz and abs(missed).max() > SAME:
         return None
@@ -140,36 +154,40 @@ def _basis_of(problem: FrictionProblem, structure: Structure | None) -> tuple | 
     Hhat.eliminate_zeros()
     Mhat = sparse.csc_array(T.T @ M @ T)
     Mhat.sort_indices()
-    return Mhat, Hhat, dofs, frames, coupling
+    return Mhat, Hhat, dofs, frames, scale, coupling
 
 
 def slave_dofs(
     M: sparse.csc_array, H: sparse.csr_array, d: int, structure: Structure | None = None
-) -> tuple[Index, Array]:
-    """(dofs (nc, d), frames (nc, d, d)) of the slave of every contact, found in the rows of H.
+) -> tuple[Index, Array, Array]:
+    """(dofs (nc, d), frames (nc, d, d), scale (nc,)) of slaves of contacts, found in H's rows.
 
-    Those of a slave act on its contact alone and are orthonormal; slots without one are -1,
-    with a column of zeros.  Where both sides qualify and no structure tells the slave, the body
-    that does so more often wins.
+    Those of a slave act on its contact alone and are orthogonal, as long as scale says; slots
+    without one are -1, with a column of zeros.  Where no structure tells the slave, their
+    length is 1; where both sides qualify, the body that does so more often wins.
     """
     nc = H.shape[1] // d
-    row, contact, vector = _rows_of_one_contact(H, d)
+    row, contact, vector, length = _rows_of_one_contact(H, d)
+    taken = length == 1
     if structure is not None:
-        slave = structure.node[row] == structure.slave[contact]
-        row, contact, vector = row[slave], contact[slave], vector[slave]
-    elif np.bincount(contact, minlength=1).max() > d:
+        taken = structure.node[row] == structure.slave[contact]
+    row, contact, vector, length = row[taken], contact[taken], vector[taken], length[taken]
+    if structure is None and np.bincount(contact, minlength=1).max() > d:
         order = np.argsort(_preference(M, H, d, row, contact), kind="stable")
-        row, contact, vector = row[order], contact[order], vector[order]
+        row, contact, vector, length = row[order], contact[order], vector[order], length[order]
     dofs = np.full((nc, d), HELD, dtype=np.int64)
-    frames = np.zeros((nc, d, d))
+    frames, scale = np.zeros((nc, d, d)), np.ones(nc)
     for slot in range(d):
         along = np.einsum("kij,ki->kj", frames[contact], vector)
-        free = np.abs(along).max(axis=1, initial=0.0) < SAME
-        row, contact, vector = row[free], contact[free], vector[free]
+        free = np.abs(along).max(axis=1, initial=0.0) < SAME * length**2
+        free &= (slot == 0) | (np.abs(length - scale[contact]) < SAME * length)
+        row, contact, vector, length = row[free], contact[free], vector[free], length[free]
         chosen, first = np.unique(contact, return_index=True)
         dofs[chosen, slot] = row[first]
         frames[chosen, :, slot] = vector[first]
-    return dofs, frames
+        if slot == 0:
+            scale[chosen] = length[first]
+    return dofs, frames, scale
 
 
 def _preference(
@@ -191,8 +209,10 @@ def _preference(
     return -count[key]
 
 
-def _rows_of_one_contact(H: sparse.csr_array, d: int) -> tuple[Index, Index, Array]:
-    """Rows of H of length 1 that touch one contact only: numbers, contacts, entries (k, d)."""
+def _rows_of_one_contact(
+    H: sparse.csr_array, d: int
+) -> tuple[Index, Index, Array, Array]:
+    """Rows of H that touch one contact only: numbers, contacts, entries (k, d), lengths."""
     counts = np.diff(H.indptr)
     owner = np.repeat(np.arange(H.shape[0]), counts)
     block = H.indices // d
@@ -201,10 +221,10 @@ def _rows_of_one_contact(H: sparse.csr_array, d: int) -> tuple[Index, Index, Arr
     single = counts > 0
     single[owner[block != first[owner]]] = False
     length = np.sqrt(np.bincount(owner, H.data**2, minlength=H.shape[0]))
-    single &= np.abs(length - 1) < SAME
+    length[np.abs(length - 1) < SAME] = 1.0
     taken = single[owner]
     row = np.flatnonzero(single)
     vector = np.zeros((len(row), d))
     place = np.cumsum(single) - 1
     vector[place[owner[taken]], H.indices[taken] % d] = H.data[taken]
-    return row, first[row], vector
+    return row, first[row], vector, length[row]

@@ -148,6 +148,25 @@ def test_tangents_where_nodes_drop_out_are_exact(dim, order, kind):
     assert checked_tangents(problem, draws) > 1
 
 
+def test_a_node_that_drops_out_leaves_its_area_and_no_energy_to_account_for():
+    """What springs of its neighbours store on it; it was booked as brought, and as rubbed."""
+    stiff = am.NeoHookean(1e3, 0.0, density=1e-3)
+    slab, block = am.box((2, 1), (4, 1), origin=(0, -1)), am.box((1.2, 1), 3, origin=(0.5, 0))
+    bodies = [am.Body(slab, stiff, name="lower"), am.Body(block, stiff, name="upper")]
+    top = (lambda x, t: 2 * np.clip(t - 0.1, 0, 0.2), lambda x, t: -0.02 * min(t / 0.1, 1.0))
+    contact = am.Contact("lower.top", master="upper.bottom", mu=0.1, stiffness=100.0,
+                         stick_stiffness=100.0)  # fmt: skip
+    held = [am.Fix("lower.bottom", 0), am.Fix("upper.top", top)]
+    model, method = am.Model(bodies, held, [contact]), am.MoreauJean(0.05, mass_damping=5.0)
+    steps = list(am.evolve(model, method, until=0.3))
+    peak = max(step.energies.total for step in steps)
+    assert [np.count_nonzero(step.state.force[:, 0]) for step in steps[-2:]] == [4, 3]
+    assert abs(steps[-1].energies.numerical) < 0.02 * peak
+    slid, normal = 0.1, 2.0
+    assert steps[-1].energies.contact == pytest.approx(-0.1 * normal * slid, rel=0.1)
+    assert abs(steps[-1].energies.defect) < 1e-10 * peak
+
+
 @pytest.mark.parametrize(("first", "last", "law"), [(1.1, 2.3, SPRINGS), (1.97, 3.2, GIVEN)])
 def test_springs_keep_their_stresses_where_inertia_ends(first, last, law):
     """A node that had dropped out, and its neighbours, go on without a jump."""

@@ -10,6 +10,7 @@ import amontons as am
 from amontons.mechanics.model.large_deformation import large_deformation, large_step
 
 NEO = am.NeoHookean(1.0, 0.3)
+BOND = {"stiffness": 2.0, "stick_stiffness": 0.5}
 
 
 def blocks(dim=2, *, order=1, cells=((3, 2), (2, 2)), kinds=(None, None), apart=0.0, **law):
@@ -135,6 +136,27 @@ def test_a_bond_acts_on_what_the_sides_share(first, last, longer):
     assert found.resultant.ravel()[1] == pytest.approx(2e-3 * long, rel=2e-4)
     assert pair.area == pytest.approx(longer * long, rel=2e-4)
     np.testing.assert_allclose(found.pressure, -2e-3 / longer, rtol=2e-4)
+
+
+@pytest.mark.parametrize(("dim", "order", "kind", "first", "last"), [
+    (2, 1, "quad", 0.0, 2.0), (2, 2, "tri", 0.55, 1.15), (3, 1, "hex", 0.55, 1.15)])
+def test_a_bond_across_a_distance_has_its_stiffness(dim, order, kind, first, last):
+    """Stiff slabs .05 apart: the slave's rows are told by its inner nodes, too."""
+    stiff, wide, mid = am.NeoHookean(1e4, 0.0, density=1e-5), (1,) * (dim - 2), (0,) * (dim - 2)
+    slab = am.box((2, *wide, 1), (4, *wide, 2), kind, origin=(0, *mid, -1))
+    block = am.box((last - first, *wide, 1), (3, *wide, 1), kind, origin=(first, *mid, 0.05))
+    bodies = [am.Body(mesh, stiff, name=name, order=order)
+              for mesh, name in ((slab, "lower"), (block, "upper"))]  # fmt: skip
+    top = (lambda x, t: min(4e-3 * t, 2e-3), *mid, lambda x, t: min(2e-3 * t, 1e-3))
+    held = [am.Fix("lower.bottom", 0), am.Fix("upper.top", top)]
+    tie = am.Contact("lower.top", master="upper.bottom", tied=True, **BOND)
+    model, area = am.Model(bodies, held, [tie]), last - first
+    for method in (am.QuasiStatic(1.0), am.MoreauJean(0.25, mass_damping=10.0)):
+        *_, found = am.evolve(model, method, until=1.0)
+        (pair,), total = found.pairs.values(), found.fields.resultant
+        np.testing.assert_allclose(total[[0, -1]], [1e-3 * area, 2e-3 * area], rtol=1e-3)
+        np.testing.assert_allclose(found.fields.pressure, -2e-3, rtol=1e-3)
+        assert pair.area == pytest.approx(area, rel=1e-3)
 
 
 @pytest.mark.parametrize(("dim", "order", "law"), [

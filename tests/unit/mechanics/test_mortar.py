@@ -295,6 +295,42 @@ def test_nodes_that_supports_hold_leave_their_share_to_others():
     assert one_sided(model.assemble()) is not None
 
 
+SPRINGS = {"stiffness": 1.0, "stick_stiffness": 0.5}
+CURVE = am.OverclosureCurve((0, 1), (0, 1))
+
+
+@pytest.mark.parametrize(("dim", "order", "kind", "first", "last", "law", "shear"), [
+    (2, 1, "quad", 1.1, 2.3, {"mu": 0.9, **SPRINGS}, 0.025),
+    (2, 1, "quad", 0.0, 4.0, {"mu": 0.1, "cohesion": 0.05, **SPRINGS}, 0.015),
+    (2, 1, "tri", 1.97, 3.2, {"mu": 0.5, "cap": 0.01, **SPRINGS}, 0.01),
+    (2, 2, "quad", 0.0, 4.0, {"tresca": 0.01, "stiffness": 1.0}, 0.01),
+    (2, 2, "tri", 1.1, 2.3, {"mu": 0.1, "stiffness": CURVE}, 0.01),
+    (3, 1, "hex", 1.1, 2.3, {"mu": 0.9, **SPRINGS}, 0.025),
+    (3, 1, "tet", 1.97, 3.2, {"tied": True, **SPRINGS}, 0.025),
+])  # fmt: skip
+def test_laws_are_those_of_all_that_neighbours_of_dropped_nodes_bear(
+    dim, order, kind, first, last, law, shear
+):
+    """A block inside facets of the slave, or a slave with held ends: .1 deep, .05 slid."""
+    mid, wide = (0,) * (dim - 2), (1,) * (dim - 1)
+    slab = am.box((4, *wide), (4, *wide), kind, origin=(0, *mid, -1))
+    block = am.box((last - first, *wide), (2, *wide), kind, origin=(first, *mid, 0))
+    stiff = am.LinearElastic(young=1e6, poisson=0.0)
+    bodies = [am.Body(mesh, stiff, name=name, order=order)
+              for mesh, name in ((slab, "lower"), (block, "upper"))]  # fmt: skip
+    held = [am.Fix("lower.bottom", 0), am.Fix("upper.top", (0.05, *mid, -0.1))]
+    if last - first == 4:
+        held += [am.Fix(f"lower.{side}", 0) for side in ("left", "right")]
+    contact = am.Contact("lower.top", master="upper.bottom", method="mortar", **law)
+    found = am.solve(am.Model(bodies, held, [contact]), tolerance=1e-10)
+    (pair,), area = found.pairs.values(), last - first
+    assert pair.area == pytest.approx(area, rel=1e-9)
+    np.testing.assert_allclose(found.pressure, 0.1, rtol=1e-4)
+    np.testing.assert_allclose(np.linalg.norm(found.shear, axis=1), shear, rtol=1e-4)
+    np.testing.assert_allclose(abs(found.resultant[[0, -1]]), [shear * area, 0.1 * area],
+                               rtol=1e-4)  # fmt: skip
+
+
 def test_one_slave_meets_two_bodies():
     left = am.Body(am.box((1, 1), (3, 2)), SOFT, name="left")
     right = am.Body(am.box((1, 1), (5, 2), origin=(1, 0)), SOFT, name="right")

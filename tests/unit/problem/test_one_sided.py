@@ -39,9 +39,24 @@ def dense_elimination(problem, basis):
     return T, T.T @ problem.M.toarray() @ T, T.T @ problem.f, T.T @ H
 
 
-@pytest.mark.parametrize("dim", [2, 3])
-def test_it_is_direct_elimination(dim):
-    problem = two_blocks(dim).assemble()
+def slab(dim):
+    """The slave, held at one end, its other sides beyond the master's; with levels."""
+    at = (0.0, *(0.2,) * (dim - 2), 1.0)
+    bodies = [
+        am.Body(am.refined(am.box((1,) * dim, 2)), SOFT, name="lower"),
+        am.Body(am.refined(am.box((0.6,) * dim, 1, origin=at)), SOFT, name="upper"),
+    ]
+    drop = (0.01, *(0,) * (dim - 2), -0.05)
+    return am.Model(
+        bodies,
+        [am.Fix("lower.bottom", 0), am.Fix("lower.left", 0), am.Fix("upper.top", drop)],
+        [am.Contact("lower.top", master="upper.bottom", mu=0.3, method="mortar")],
+    )
+
+
+@pytest.mark.parametrize("model", [two_blocks(2), two_blocks(3), slab(2), slab(3)])
+def test_it_is_direct_elimination(model):
+    problem, dim = model.assemble(), model.dimension
     basis = one_sided(problem)
     T, M, f, H = dense_elimination(problem, basis)
     size = abs(M).max()
@@ -55,8 +70,10 @@ def test_it_is_direct_elimination(dim):
     np.testing.assert_allclose(basis.near_nullspace, modes, atol=1e-14)
     u = np.einsum("pij,pj->pi", basis.frames, vhat[basis.dofs])
     np.testing.assert_allclose(u, (H.T @ vhat).reshape(u.shape), atol=1e-14)
-    identity = np.einsum("pij,pik->pjk", basis.frames, basis.frames)
+    identity = np.einsum("pij,pik->pjk", basis.axes, basis.axes)
     np.testing.assert_allclose(identity, np.tile(np.eye(dim), (len(u), 1, 1)), atol=1e-14)
+    inverse = np.einsum("pij,pik->pjk", basis.inverse, basis.frames)
+    np.testing.assert_allclose(inverse, np.tile(np.eye(dim), (len(u), 1, 1)), atol=1e-14)
 
 
 def test_the_slave_keeps_its_side():
@@ -78,6 +95,19 @@ def test_both_bases_have_one_solution():
     np.testing.assert_allclose(ours.r, theirs.r, atol=1e-8 * abs(theirs.r).max())
     v = basis.to_displacement(ours.v)
     np.testing.assert_allclose(v, theirs.v, atol=1e-8 * abs(theirs.v).max())
+
+
+@pytest.mark.parametrize("solver", [
+    am.ContactMultigrid(), am.ActiveSet(bound=am.FrictionBound.FIXED_POINT, nested=True),
+    am.ActiveSet(bound=am.FrictionBound.FIXED_POINT, multigrid=am.MultigridCycle()),
+])  # fmt: skip
+def test_solvers_know_shares_of_other_nodes(solver):
+    problem = slab(3).assemble()
+    assert one_sided(problem).scale.min() < 0.7
+    expected, found = (am.drive(problem, s, tolerance=1e-10)
+                       for s in (am.SemismoothNewton(), solver))  # fmt: skip
+    assert {"slip", "stick"} <= {k for k, v in expected.counts.items() if v}
+    np.testing.assert_allclose(found.r, expected.r, atol=1e-7 * abs(expected.r).max())
 
 
 def test_one_body_copies_nothing():

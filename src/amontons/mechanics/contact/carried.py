@@ -10,10 +10,11 @@ distance goes with the deformation of the slave's body beside it, whose nodes ta
 it bears.  The forces -T_pj lambda_p are without sum, and without moment, as
 sum_j x_j x T_pj lambda_p = (T x)_p x lambda_p ([P]: there the mesh is moved until c = 0).
 c is that of least squares, on p and nodes off the slave's surface, so that the force on p is
-still that of p alone; rows are scaled to T_pp = 1.
+still that of p alone; rows are scaled to T_pp = 1, T = a (B - c).
 
-An elastic bond has T x = -pi C lambda in the place of T x = 0, normal and tangential, pi of
-`current_mortar`: how much of lambda the slave's side gets, whose mean distance is T x / pi.
+An elastic bond has T x = -a pi C lambda in the place of T x = 0, normal and tangential, pi of
+`current_mortar`: the slave's side gets a pi lambda, and its mean distance is T x / (a pi).
+lambda acts on an area D_p / a, for which C and the stresses that are told are taken.
 
 [P] M. Puso, "A 3D mortar method for solid mechanics", Int. J. Numer. Meth. Engng 59 (2004).
 """
@@ -44,12 +45,14 @@ FLAT = 1e-6  # singular value over the largest below which nodes lie on a plane
 class TiedPair:
     """Sides that neither part nor slip: pair, of the undeformed state; rows T (nc, nodes).
 
-    areas: how those around the slaves grow, for what is told of stresses: bonds keep theirs.
+    passed (nc,): a pi; share (nc,): 1 / a; areas: how those around the slaves grow, for what is
+    told of stresses: bonds keep theirs.
     """
 
     pair: MortarPair
     rows: sparse.csr_array
     passed: Array
+    share: Array
     areas: GrownAreas
 
     @classmethod
@@ -66,20 +69,20 @@ class TiedPair:
         on_slave = np.zeros(len(X), dtype=bool)
         on_slave[pair.slave.every] = True
         entries: list[tuple[Array, Index, Index]] = []
-        scale = np.ones(len(apart))
+        share = np.ones(len(apart))
         for p in far:
             node = int(pair.slaves[p])
             nodes, parts = _told_by(node, apart[p], X, beside, on_slave)
             own = -parts.sum()
-            scale[p] = 1 / (1 - own)
+            share[p] = 1 - own
             entries.append((np.append(parts, own), np.full(len(nodes) + 1, p),
                             np.append(nodes, node)))  # fmt: skip
         if entries:
             values, row, column = (np.concatenate(k) for k in zip(*entries, strict=True))
             away = sparse.coo_array((values, (row, column)), shape=rows.shape)
-            rows = sparse.diags_array(scale) @ (rows - away.tocsr())
+            rows = sparse.diags_array(1 / share) @ (rows - away.tocsr())
         areas = GrownAreas(pair.slaves, pair.slave, X)
-        return cls(pair, sparse.csr_array(rows), -onto * scale, areas)
+        return cls(pair, sparse.csr_array(rows), -onto / share, share, areas)
 
     @property
     def slaves(self) -> Index:
@@ -140,13 +143,13 @@ class TiedMeeting:
 
     @property
     def growth(self) -> Array:
-        """Of `grown_areas`, (nc,): bonds keep their area."""
-        return np.ones(len(self.slaves))
+        """Of `grown_areas`, (nc,): bonds keep their area, D_p / a."""
+        return self.pair.share
 
     @cached_property
     def stretch(self) -> Array:
         """Of areas around the slaves, (nc,), as `grown_areas` has it in front of obstacles."""
-        return self.pair.areas.at(self.x)
+        return self.pair.areas.at(self.x) * self.pair.share
 
     @property
     def passed(self) -> Array:

@@ -2,7 +2,7 @@
 
 With the dual basis psi of the slave surface ([HSW] section 2, see `dual`) and
 
-    D_p = int psi_p phi_p,    M_pq = int psi_p phi_q^master,
+    D_p = int psi_p,    M_pq = int psi_p phi_q^master,
 
     u_p = R_p (v_p - sum_q (M_pq / D_p) v_q) + [gap_p, 0, 0],    gap_p = (1 / D_p) int g psi_p,
 
@@ -14,7 +14,8 @@ facets.  Small strains: all is taken once, in the reference configuration.
 
 No multiplier is there for nodes that supports hold in the normal direction, and for those of
 which hardly anything faces the other side; their neighbours take their share, and feel their
-displacement: u_p then has the term R_p (int psi_p phi_s / D_p) v_s of such a node s.
+displacement: u_p then has the terms R_p (int psi_p phi_s / D_p) v_s of such nodes s and
+R_p (int psi_p phi_p / D_p) v_p, which together are a mean; r_p acts on all of them.
 Components of the displacement that supports hold on both sides for good (planes of symmetry)
 are left out of u, and of the normals.  For good means to one value that does not depend on
 time: sides that are held at first and then moved apart slide, and friction acts.
@@ -170,8 +171,8 @@ class _Average:
     """Averages of nodal values over the slave surface, one for each node with multiplier.
 
     nodes (nc,); weights (nc,): D_p; facets (f,) that take part, mass (f, 4, 4): int phi phi on
-    what faces the other side, psi (f, 4, 4): dual functions; onto_slave (nc, n): 1 at the node,
-    its average of others without multiplier besides.
+    what faces the other side, psi (f, 4, 4): dual functions; onto_slave (nc, n): means of the
+    slave's own values, of the node alone but where others without multiplier are beside it.
     """
 
     surface: Surface
@@ -199,7 +200,10 @@ class _Average:
         kept = nodes_with_multiplier(nodes, real, held, reached < HARDLY, reached)
         psi = dual_functions(mass, kept[nodes] & real, real)
         chosen = np.unique(nodes[kept[nodes] & real])
-        weights = _scatter(n, nodes, np.einsum("faa->fa", psi @ mass))[chosen]
+        own_part = _scatter(n, nodes, np.einsum("faa->fa", psi @ mass))[chosen]
+        left = (real & ~kept[nodes]).astype(float)
+        shared = _scatter(n, nodes, (psi @ mass @ left[:, :, None])[:, :, 0])
+        weights = own_part + shared[chosen]
         if own is not None:
             product = _between(nodes, psi @ own, surface.all[facets], (n, n))[chosen]
             onto = _cleaned(product, weights)
@@ -207,7 +211,7 @@ class _Average:
         product = _between(nodes, psi @ mass, nodes, (n, n))[chosen]
         extra = product @ sparse.diags_array(np.where(kept, 0.0, 1.0))
         itself = sparse.csr_array(
-            (np.ones(len(chosen)), (np.arange(len(chosen)), chosen)), shape=(len(chosen), n)
+            (own_part / weights, (np.arange(len(chosen)), chosen)), shape=(len(chosen), n)
         )
         return cls(surface, facets, mass, chosen, weights, psi,
                    itself + _cleaned(extra, weights))  # fmt: skip

@@ -53,7 +53,9 @@ class Contacts:
     """Contacts (k,) of one process, or of all: number in the model, slave node, and the rest.
 
     frames (k, d, d): by rows, tangents turned to what supports hold; turn (k, d, d): from
-    there to the frame of the model; able (k, d): directions that no support holds.
+    there to the frame of the model; able (k, d): directions that no support holds; part (k,):
+    1 over what the slave node bears itself of the model's forces, see `contact.mortar`.  Here
+    forces are those, and u and gap in proportion, part times those of the model.
     """
 
     number: Index
@@ -64,12 +66,13 @@ class Contacts:
     able: Mask
     weights: Array
     law: Law
+    part: Array
 
     def at(self, index: Index, node: Index) -> Contacts:
         """Some of them, whose nodes have other numbers."""
         return Contacts(
             self.number[index], node, self.gap[index], self.frames[index], self.turn[index],
-            self.able[index], self.weights[index], self.law.at(index),
+            self.able[index], self.weights[index], self.law.at(index), self.part[index],
         )  # fmt: skip
 
 
@@ -256,14 +259,17 @@ def _in_frames(  # noqa: PLR0913  # what contacts are made of
     of = slave[row // d]
     mine = of == column // d
     expected = frames[of[mine], column[mine] % d, row[mine] % d]
-    if np.abs(turned.data[mine] - expected).max(initial=0.0) > SAME or (
-        (of >= 0) & ~mine & (np.abs(turned.data) > SAME)
+    own = np.bincount(of[mine], turned.data[mine] * expected, minlength=nc) / d
+    part = 1 / np.where(own > 0, own, 1.0)
+    values = turned.data * part[column // d]
+    if np.abs(values[mine] - expected).max(initial=0.0) > SAME or (
+        (of >= 0) & ~mine & (np.abs(values) > SAME)
     ).any():
         raise UnsupportedForm(
             "contacts: a node is a slave and belongs to the other side of another contact; "
             "several processes need it on one side, solve this model on one"
         )
-    others = ~mine & (np.abs(turned.data) > 0)
+    others = ~mine & (np.abs(values) > 0)
     held = ~able.ravel()[column] & others
     if (held & ~fixed.ravel()[row]).any():
         raise UnsupportedForm(
@@ -271,12 +277,14 @@ def _in_frames(  # noqa: PLR0913  # what contacts are made of
             "moves; several processes can not do this yet, solve this model on one"
         )
     B = sparse.csc_array(
-        (turned.data[others], (row[others], column[others])), shape=H.shape
+        (values[others], (row[others], column[others])), shape=H.shape
     )
     in_frames = fixed.copy()
     in_frames[node] = ~able
     index = np.arange(nc)
-    return in_frames, Contacts(index, node, gap, frames, turn, able, sites.weights, law), B
+    contacts = Contacts(index, node, gap * part, frames, turn, able, sites.weights,
+                        law.scaled(1 / part), part)  # fmt: skip
+    return in_frames, contacts, B
 
 
 def _turned(frame: Array, held: Mask, point: Array) -> Array:

@@ -87,15 +87,17 @@ class DistributedSolution:
             values[contacts.node] = np.einsum(
                 "kab,ka->kb", contacts.frames, values[contacts.node]
             )
+        part = contacts.part[:, None]
+        r = part * found.r
         status = np.where(found.sliding, SLIP, np.where(found.closed, STICK, OPEN))
         total = comm.allreduce(np.concatenate([
-            np.einsum("kab,ka->kb", contacts.frames, found.r).sum(axis=0),
+            np.einsum("kab,ka->kb", contacts.frames, r).sum(axis=0),
             np.bincount(status, minlength=3),
         ]))  # fmt: skip
         return cls(
             share.nodes[share.own], v, support, contacts.number,
-            np.einsum("kab,kb->ka", contacts.turn, found.r),
-            np.einsum("kab,kb->ka", contacts.turn, found.u), status.astype(np.int8),
+            np.einsum("kab,kb->ka", contacts.turn, r),
+            np.einsum("kab,kb->ka", contacts.turn, found.u) / part, status.astype(np.int8),
             total[:d],
             dict(zip(("open", "stick", "slip"), total[d:].astype(int).tolist(), strict=True)),
             found.error, found.converged, found.steps, K.iterations, K.rebuilt, found.why, comm,

@@ -178,8 +178,8 @@ class _Step:
         self.growth = whole if stressed else np.zeros(0)
         law, self.springs = model.springs_on(whole)
         self.law = self.springs.of_impulses(law, h, method.theta).at(self.active)
-        # forces that draw springs as far on the areas of now as those before did on theirs
-        grown = self.growth / state.growth if state.growth.size else self.growth
+        # forces that draw springs as far on areas of now, which who dropped out has none of
+        grown = np.where(meeting.met, whole / (state.growth if state.growth.size else 1), 0.0)
         self.drawn = state.force * grown[:, None] if stressed else state.force
         self.load = 0.5 * (motion.load(state.time) + motion.load(time))
         self.held = (motion.prescribed(time) - motion.prescribed(state.time)) / h

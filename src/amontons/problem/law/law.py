@@ -92,7 +92,7 @@ class Law(KeepsLocks):
         of_area = np.isfinite(self.plain.parameters[:, BOUND]) | (self.cohesion > 0)
         if self.give is not None:
             of_area |= (self.give > 0).any(axis=1)
-        return self.varies or bool((of_area & ~self.tied).any())
+        return self.varies or bool(of_area.any())
 
     def bound(self, r: Array) -> Array:
         """Largest |r_T| allowed at r, shape (nc,)."""

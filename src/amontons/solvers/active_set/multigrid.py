@@ -2,9 +2,10 @@
 
 The rows of the contact nodes carry the conditions of the active sets in the local basis,
 
-    F^T G_r F (M v - f) + F^T G_u (F v + w) = F^T b,
+    F^T G_r F (M v - f) / a^2 + F^T G_u (F v + w) = F^T b,
 
-F = frames, which keeps every node block 3x3 and couples a contact to no new node: block
+F = frames, a the length of their columns (1 but where nodes bear the share of others), which
+keeps every node block 3x3 and couples a contact to no new node: block
 Gauss-Seidel respects Dirichlet, Robin and natural conditions alike.  Coarse levels are Galerkin
 products with test and trial functions that vanish in the Dirichlet directions of the finest
 level.  Only what couples to those directions changes from step to step:
@@ -68,11 +69,13 @@ class MultigridCycle:
 class Contacts:
     """Where contacts sit among node blocks: node (nc,), frames (nc, 3, 3) on the padded node.
 
-    idle (nc, 3): components of those nodes that are no unknowns.
+    squared (nc, 1, 1): the length of their columns, squared; idle (nc, 3): components of those
+    nodes that are no unknowns.
     """
 
     node: Index
     frames: Array
+    squared: Array
     idle: NDArray[np.bool_]
 
     @classmethod
@@ -86,13 +89,17 @@ class Contacts:
         frames[contact, :d, component] = basis.frames[contact, :, slot]
         idle = np.ones((nc, 3), dtype=bool)
         idle[contact, component] = False
-        return cls(place[:, 0] // 3, frames, idle)
+        return cls(place[:, 0] // 3, frames, basis.scale[:, None, None] ** 2, idle)
 
     def to_nodes(self, blocks: Array) -> Array:
-        """F^T blocks F, (nc, 3, 3), of local blocks (nc, d, d)."""
+        """F^T blocks F, (nc, 3, 3), of local blocks (nc, d, d): forces by displacements."""
         d = blocks.shape[1]
         F = self.frames[:, :d]
         return np.einsum("kai,kab,kbj->kij", F, blocks, F)
+
+    def among_nodes(self, blocks: Array) -> Array:
+        """F^T blocks F^-T, (nc, 3, 3): forces by forces, or displacements by displacements."""
+        return self.to_nodes(blocks) / self.squared
 
 
 class ContactCycles:
@@ -131,7 +138,7 @@ class ContactCycles:
     def set(self, given: Conditions, f: Array, w: Array) -> None:
         """Take over the conditions of a step; f (n,) load, w (nc, d) constant part of u."""
         A, contacts = self.matrices[0], self.contacts
-        K, U = contacts.to_nodes(given.G_r), contacts.to_nodes(given.G_u)
+        K, U = contacts.among_nodes(given.G_r), contacts.to_nodes(given.G_u)
         U[:, range(3), range(3)] += contacts.idle * self.size[:, None]
         scale = self.size[:, None, None]  # Dirichlet rows in the unit of the others
         U += (scale - 1) * contacts.to_nodes(self._dirichlet(given)[:, :, None] * given.G_u)
@@ -176,7 +183,7 @@ class ContactCycles:
             return
         fixed = self._dirichlet(given)
         identity = np.eye(fixed.shape[1])
-        self.projection = self.contacts.to_nodes(fixed[:, :, None] * identity)
+        self.projection = self.contacts.among_nodes(fixed[:, :, None] * identity)
         Q = _blocks(self.projection)
         QP = Q @ self.P
         X = QP.T @ (self.MP - 0.5 * (self.M_contact @ QP))

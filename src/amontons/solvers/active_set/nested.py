@@ -12,7 +12,7 @@ from ...linear.levels import fine_unknown
 from ...problem.friction import FrictionProblem
 from ...problem.law import Law
 from ...problem.law.law import BOUND
-from ...problem.one_sided import HELD, one_sided
+from ...problem.one_sided import HELD, OneSided, one_sided
 from ..contract import Iterate
 
 Array = NDArray[np.float64]
@@ -28,17 +28,16 @@ NO_COARSER = (
 class Coarser:
     """A coarse problem and the way back.
 
-    P (n, coarse n); weights (nc, coarse nc): the same between slave nodes; dofs (nc, d) and
-    frames (nc, d, d) of the slaves as in `OneSided`; contacts: fine numbers of the coarse ones;
-    area (nc,): that of the contacts up to a factor, from the stiffness of their nodes.
+    P (n, coarse n); weights (nc, coarse nc): the same between slave nodes; basis: of the fine
+    problem; contacts: fine numbers of the coarse ones; area (nc,): that of the contacts up to a
+    factor, from the stiffness of their nodes.
     """
 
     problem: FrictionProblem
     fine: FrictionProblem
     P: sparse.csr_array
     weights: sparse.csr_array
-    dofs: Index
-    frames: Array
+    basis: OneSided
     contacts: Index
     area: Array
 
@@ -49,10 +48,10 @@ class Coarser:
         closed stays closed although finer facets have other gaps and normals.
         """
         assert found.v is not None
-        force = np.einsum("kij,ki->kj", self.frames[self.contacts], found.r)
+        force = np.einsum("kij,ki->kj", self.basis.frames[self.contacts], found.r)
         traction = force / (self.weights.T @ self.area)[:, None]
         spread = self.area[:, None] * (self.weights @ traction)
-        r = np.einsum("kij,kj->ki", self.frames, spread)
+        r = np.einsum("kij,kj->ki", self.basis.inverse, spread)
         guess = self.fine.guess
         if guess is None:
             v = self.P @ found.v
@@ -65,16 +64,16 @@ class Coarser:
 
         Those between nodes without a contact keep what they have.
         """
-        coarse = self.frames[self.contacts]
-        slip = self.weights @ np.einsum("kij,ki->kj", coarse[:, 1:], u[:, 1:])
-        wanted = np.einsum("kij,kj->ki", self.frames, slip)
+        axes, dofs = self.basis.axes, self.basis.dofs
+        slip = self.weights @ np.einsum("kij,ki->kj", axes[self.contacts][:, 1:], u[:, 1:])
+        wanted = np.einsum("kij,kj->ki", axes, slip)
         wanted[:, 0] = self.weights @ u[:, 0]
         change = wanted - self.fine.local_velocity(v)
-        moved = np.einsum("kij,ki->kj", self.frames, change)
+        moved = np.einsum("kij,ki->kj", self.basis.inverse, change)
         whole = np.abs(self.weights.sum(axis=1) - 1) < WHOLE
-        used = (self.dofs != HELD) & whole[:, None]
+        used = (dofs != HELD) & whole[:, None]
         out = v.copy()
-        out[self.dofs[used]] += moved[used]
+        out[dofs[used]] += moved[used]
         return out
 
 
@@ -124,7 +123,7 @@ def coarser(fine: FrictionProblem) -> Coarser | None:
         return None
     used = basis.dofs != HELD
     area = np.where(used, fine.M.diagonal()[basis.dofs], 0.0).sum(axis=1)
-    return Coarser(problem, fine, P, weights, basis.dofs, basis.frames, contacts, area)
+    return Coarser(problem, fine, P, weights, basis, contacts, area)
 
 
 def _law(law: Law, contacts: Index, weights: sparse.csr_array) -> Law:

@@ -104,7 +104,7 @@ class Cycles:
         self.tool = problem.kept(_contact_cycles)
         used = basis.dofs != HELD
         self.slots = np.where(used, basis.dofs, 0)
-        self.frames = basis.frames * used[:, None, :]
+        self.frames, self.to_reaction = basis.frames, basis.inverse
         self.rows = sparse.csr_array(basis.M)[self.slots.ravel()]
 
     def state(self, start: Iterate) -> State:
@@ -117,7 +117,7 @@ class Cycles:
         with self.tool.lock:
             v, count = self._solve(given, state)
         force = (self.rows @ v).reshape(self.slots.shape) - self.basis.f[self.slots]
-        r = np.einsum("kij,kj->ki", self.frames, force)
+        r = np.einsum("kij,kj->ki", self.to_reaction, force)
         u = np.einsum("kij,kj->ki", self.frames, v[self.slots]) + self.problem.w
         return State(r, u, v, count)
 
