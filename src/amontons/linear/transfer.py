@@ -186,7 +186,7 @@ class Transfer:
         if len(self.blocks):
             values = np.abs(self.blocks[slots]).max(axis=(1, 2), initial=0)
         terms = values * np.repeat(fine[node], np.diff(ends))
-        return np.bincount(self.indices[slots], terms, self.coarse)
+        return np.bincount(self.indices[slots], terms, self.coarse).astype(float, copy=False)
 
     def galerkin(self, A: NodeBlocks) -> NodeBlocks:
         """P^T A P with ones on the diagonal of coarse padding."""
