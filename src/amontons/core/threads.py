@@ -7,7 +7,7 @@ the result.  Sums over all rows are those of blocks of fixed length (`BLOCK`), a
 
 The caller works as well, and takes what no thread has begun with (`team`), so that any number
 of solves at the same time, each in a thread of its user, can not wait for each other.  What
-takes less than some ten microseconds a part is not shared at all.
+takes less than some hundred microseconds is not shared at all.
 
 Numba's own threads are not used: of its layers the one that comes with every wheel ends the
 process when two threads use it at the same time.
@@ -28,6 +28,7 @@ Kernel = Callable[..., None]
 Range = tuple[int, int]
 BLOCK = 8192  # rows of a partial sum
 GRAIN = 50_000  # numbers that a part touches at least: 20 µs; to wake a thread takes 40
+WORTH = 5  # such parts in a loop: half of it outweighs waking a helper, and then the caller
 FINER = 2  # parts for each thread where these cost nothing: who comes late leaves one to others
 DEFAULT_MOST = 16  # threads without being told: then memory is the limit, not the cores
 VARIABLE = "AMONTONS_THREADS"
@@ -113,7 +114,7 @@ def split(rows: int, work: float, least: int = 1, finer: int = 1) -> list[Range]
 
     least: rows of a range, where there are more ranges than one; finer: ranges for each thread.
     """
-    count = int(min(work // GRAIN, rows // least))
+    count = int(min(work // GRAIN, rows // least)) if work >= WORTH * GRAIN else 1
     allowed = threads() if count > 1 else 1
     if allowed == 1:
         return [(0, rows)]
@@ -124,7 +125,7 @@ def split(rows: int, work: float, least: int = 1, finer: int = 1) -> list[Range]
 
 def over_rows(kernel: Kernel, rows: int, work: float, *arguments: Any) -> None:
     """kernel(first, last, *arguments) for all of range(rows), in parts."""
-    if work < 2 * GRAIN:  # of small problems the Python around kernels is what takes time
+    if work < WORTH * GRAIN:  # of small problems the Python around kernels is what takes time
         kernel(0, rows, *arguments)
     else:
         shared(kernel, split(rows, work, finer=FINER), arguments)
@@ -141,7 +142,7 @@ def over_chunks(
     kernel: Kernel, chunks: Sequence[Range], work: float, *arguments: Any
 ) -> None:
     """kernel(first, last, *arguments) for every one of some ranges of rows, in any order."""
-    parts = [] if work < 2 * GRAIN else split(len(chunks), work, finer=FINER)
+    parts = [] if work < WORTH * GRAIN else split(len(chunks), work, finer=FINER)
     if len(parts) > 1:
         _in_threads(kernel, [chunks[first:last] for first, last in parts], arguments)
     else:

@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING, ClassVar
 import numpy as np
 from numpy.typing import NDArray
 
-from ..core.threads import over_rows, shared, split
+from ..core.threads import FINER, over_rows, shared, split
 from .grid_kernels import product_of_lines, scaled, smoothed_lines
 from .node_blocks import NodeBlocks, block_inverse
 
@@ -78,7 +78,8 @@ class GridBlocks:
         self._product(x, b, out, True)
 
     def _product(self, x: Array, b: Array, out: Array, rest: bool) -> None:
-        ranges = split(self._lines, 30.0 * self.nodes)  # few: each reads lines of others
+        reach = self.shape[1] + 1  # lines of others that a part reads on either side
+        ranges = split(self._lines, 30.0 * self.nodes, least=4 * reach, finer=FINER)
         arguments = self.shape, *self._terms, self.stencils, self.used, x, b, out, rest
         shared(product_of_lines, ranges, arguments)
 
@@ -94,8 +95,12 @@ class GridBlocks:
 
     def first_smooth(self, b: Array, x: Array, r: Array) -> None:
         """The same from x = 0, and r = b - A x."""
-        self._smooth(b, x, self._free, True)
+        self.smooth_from_zero(b, x, self._free)
         self.residual(x, b, r)
+
+    def smooth_from_zero(self, b: Array, x: Array, held: NDArray[np.bool_]) -> None:
+        """`smooth` of x = 0, whatever x is before."""
+        self._smooth(b, x, held, True)
 
     def _smooth(self, b: Array, x: Array, held: NDArray[np.bool_], from_zero: bool) -> None:
         """Both steps in one pass over the vectors, see `smoothed_lines`."""

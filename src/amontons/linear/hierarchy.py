@@ -281,14 +281,17 @@ class Hierarchy:
         return x, most if size <= goal else most + 1
 
     def estimate(self, b: Array, size: int) -> Array:
-        """x of A x = b, (nodes, 3), from the first level of at most `size` nodes alone."""
-        k, loads = 0, [b]
+        """x of A x = b, (nodes, 3), from the first level of at most `size` nodes alone.
+
+        Padding of b becomes zero.
+        """
+        k = 0
         while self.levels[k].A.nodes > size and self.levels[k].P is not None:
-            coarse = np.zeros((self.levels[k + 1].A.nodes, 3))
-            self.levels[k].P.restrict(loads[-1].copy(), coarse)  # type: ignore[union-attr]
-            loads.append(coarse)
+            coarse = np.empty((self.levels[k + 1].A.nodes, 3))
+            self.levels[k].P.restrict(b, coarse)  # type: ignore[union-attr]
+            b = coarse
             k += 1
-        x = self.solve(k, loads[-1], 1e-3, 30)[0]
+        x = self.solve(k, b, 1e-3, 30)[0]
         for level in reversed(self.levels[:k]):
             fine = np.zeros((level.A.nodes, 3))
             level.P.add(x, fine)  # type: ignore[union-attr]

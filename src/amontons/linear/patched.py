@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 
 from ..core.compiled import njit
 from ..core.threads import over_rows, over_stages
+from .grid import GridBlocks
 from .level_matrix import LevelMatrix
 from .node_blocks import NodeBlocks, row_product, row_product_back
 from .some_rows import Pattern, relax
@@ -32,6 +33,7 @@ class Rows(Pattern):
 
     number: NDArray[np.int32]
     slots: Index
+    _known: list[NodeBlocks] = field(default_factory=list)
 
     @classmethod
     def of(cls, A: NodeBlocks, node: Index) -> Rows:
@@ -40,6 +42,12 @@ class Rows(Pattern):
         number[node] = np.arange(len(node))
         slots, ends = A.slots(node)
         return cls(node, ends.astype(np.int32), A.indices[slots], number, slots)
+
+    def of_operator(self, A: LevelMatrix) -> NodeBlocks:
+        """These rows of the matrix A that they are of, not stored; made once."""
+        if not self._known:
+            self._known.append(A.rows(self.node))
+        return self._known[0]
 
 
 @dataclass(eq=False)
@@ -123,8 +131,8 @@ class PatchedOperator:
     own: NDArray[np.bool_] = field(init=False)
 
     def __post_init__(self) -> None:
-        known = self.base.rows(self.rows.node)
-        self.data, self.inverse = known.data, known.inverse
+        known = self.rows.of_operator(self.base)
+        self.data, self.inverse = known.data.copy(), known.inverse.copy()
         self.own = self.rows.number >= 0
 
     @property
@@ -143,9 +151,17 @@ class PatchedOperator:
 
     def first_smooth(self, b: Array, x: Array, r: Array) -> None:
         """The same forwards from x = 0, and r = b - A x."""
-        x[:] = 0.0
-        self.smooth(b, x, np.zeros(self.nodes, dtype=bool), False)
+        if isinstance(self.base, GridBlocks):
+            self.base.smooth_from_zero(b, x, self.own)
+        else:
+            x[:] = 0.0
+            self.base.smooth(b, x, self.own, False)
+        self.rows.sweep(self.data, self.inverse, b, x, self._free, False)
         self.residual(x, b, r)
+
+    @cached_property
+    def _free(self) -> NDArray[np.bool_]:
+        return np.zeros(self.nodes, dtype=bool)
 
     def residual(self, x: Array, b: Array, out: Array) -> None:
         """out = b - A x."""

@@ -14,7 +14,7 @@ from ..core.compiled import njit
 from ..core.copies import copy_rows_inplace
 from ..core.threads import over_rows
 from .box_transfer import add_in_box, restrict_in_box
-from .node_blocks import NodeBlocks, row_product, with_diagonal
+from .node_blocks import NodeBlocks, row_product, slots_of_rows, with_diagonal
 from .products import product
 
 Array = NDArray[np.float64]
@@ -177,6 +177,16 @@ class Transfer:
             over_rows(kernel, self.coarse, work, start, row, values, fine, coarse)
         if self.coarse_idle.size:
             coarse.reshape(-1)[self.coarse_idle] = 0.0
+
+    def restrict_few(self, fine: Array) -> Array:
+        """P^T fine by the weights of `scalar`, (coarse,); fine (fine,) is mostly zero."""
+        node = np.flatnonzero(fine)
+        slots, ends = slots_of_rows(self.indptr, node)
+        values = self.weights[slots]
+        if len(self.blocks):
+            values = np.abs(self.blocks[slots]).max(axis=(1, 2), initial=0)
+        terms = values * np.repeat(fine[node], np.diff(ends))
+        return np.bincount(self.indices[slots], terms, self.coarse).astype(float, copy=False)
 
     def galerkin(self, A: NodeBlocks) -> NodeBlocks:
         """P^T A P with ones on the diagonal of coarse padding."""

@@ -34,6 +34,16 @@ def norm(a: Array) -> float:
     return float(np.sqrt(dot(a, a)))
 
 
+def norm_of_rest(a: Array, b: Array, c: Array) -> float:
+    """|a - b - c|."""
+    if a.size < BLOCK:  # nothing to share, nor a kernel to compile
+        return float(np.linalg.norm(a - b - c))
+    sums = np.empty(blocks_of(a.size))
+    flat = [v.reshape(-1) for v in (a, b, c)]
+    over_blocks(_rest, a.size, 4.0 * a.size, *flat, sums)
+    return float(np.sqrt(np.add.reduce(sums)))
+
+
 def norms_of(a: Array, kind: NDArray[np.int8]) -> tuple[float, float]:
     """|a| of (nodes, 3) without the nodes LEFT_OUT, and of those that are BESIDE alone."""
     sums = np.empty((blocks_of(len(a)), 2))
@@ -45,6 +55,12 @@ def norms_of(a: Array, kind: NDArray[np.int8]) -> tuple[float, float]:
 def copy_into(a: Array, out: Array) -> None:
     """out = a."""
     over_blocks(_copy, a.size, 2.0 * a.size, a.reshape(-1), out.reshape(-1))
+
+
+def copy_both(a: Array, a_out: Array, b: Array, b_out: Array) -> None:
+    """a_out = a and b_out = b, all of one size."""
+    flat = [v.reshape(-1) for v in (a, a_out, b, b_out)]
+    over_blocks(_copy_both, a.size, 4.0 * a.size, *flat)
 
 
 def add_scaled(a: float, x: Array, y: Array) -> None:
@@ -104,6 +120,27 @@ def _dot(begin, end, a, b, sums):
         sums[first // BLOCK] = total
 
 
+@njit(cache=True, error_model="numpy", fastmath={"contract", "reassoc"}, nogil=True)
+def _square(a):
+    total = 0.0
+    for i in range(len(a)):
+        total += a[i] * a[i]
+    return total
+
+
+@njit(cache=True, error_model="numpy", nogil=True)
+def _rest(begin, end, a, b, c, sums):
+    """Terms that cancel are taken off in their order, which `reassoc` would not keep."""
+    rest = np.empty(BLOCK)
+    for first in range(begin, end, BLOCK):
+        last = min(first + BLOCK, end)
+        a_now, b_now, c_now = a[first:last], b[first:last], c[first:last]
+        left = rest[: last - first]
+        for i in range(len(left)):
+            left[i] = a_now[i] - b_now[i] - c_now[i]
+        sums[first // BLOCK] = _square(left)
+
+
 @njit(cache=True, error_model="numpy", nogil=True)
 def _squares(begin, end, a, kind, sums):
     for first in range(begin, end, BLOCK):
@@ -121,6 +158,13 @@ def _squares(begin, end, a, kind, sums):
 def _copy(begin, end, a, out):
     for i in range(begin, end):
         out[i] = a[i]
+
+
+@njit(cache=True, error_model="numpy", nogil=True)
+def _copy_both(begin, end, a, a_out, b, b_out):  # noqa: PLR0913
+    for i in range(begin, end):
+        a_out[i] = a[i]
+        b_out[i] = b[i]
 
 
 @njit(cache=True, error_model="numpy", nogil=True)

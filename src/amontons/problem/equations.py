@@ -25,6 +25,7 @@ from ..linear.blocks import (
     spatial,
     velocity_inplace,
 )
+from ..linear.vectors import norm_of_rest
 from . import indefinite, residuals
 from .judge import measures as judge
 from .judge.contacts import Assessed, assessed
@@ -209,9 +210,7 @@ class Equations(Matrices):
             return 0.0
         assert self.M is not None and self.H is not None and self.f is not None
         push = self.H @ r.ravel()
-        force = self.times_M(v) - push
-        force -= self.f
-        rest = float(np.linalg.norm(force))
+        rest = norm_of_rest(self.times_M(v), push, self.f)
         if not np.isfinite(rest):
             return np.inf
         load = self.load or float(np.linalg.norm(push))
@@ -374,8 +373,7 @@ class Equations(Matrices):
         if hierarchy is None:
             return self.free_velocity
         assert self.f is not None and self.M is not None
-        v = self.guess if self.guess is not None else np.zeros(self.unknowns)
-        rest = self.f - self.times_M(v) if self.guess is not None else self.f
+        rest = self.f if self.guess is None else self.f - self.times_M(self.guess)
         nodes = hierarchy.nodes
-        v = v + nodes.gather(hierarchy.estimate(nodes.spread(rest), ESTIMATED // 9))
-        return self.local_velocity(v)
+        v = nodes.gather(hierarchy.estimate(nodes.spread(rest), ESTIMATED // 9))
+        return self.local_velocity(v if self.guess is None else self.guess + v)

@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 
 from ..core.compiled import njit
 from ..core.threads import BLOCK, over_blocks
-from ..linear.vectors import blocks_of, copy_into, norm
+from ..linear.vectors import blocks_of, copy_both, norm
 
 Array = NDArray[np.float64]
 RANK = 1e-13  # is added to the diagonal of the scaled Gram matrix
@@ -52,8 +52,7 @@ class LeastResidual:
             return
         if self.count < 0:
             self.count, self.unit = 0, _unit(norm(r) / max(len(r), 1) ** 0.5)
-        copy_into(x, self.point)
-        copy_into(r, self.residual)
+        copy_both(x, self.point, r, self.residual)
 
     def mix(self, x: Array, r: Array) -> bool:
         """x with residual r, one step after the point kept, becomes the best point, in place.

@@ -16,7 +16,16 @@ from amontons.core import threads as threads_
 from amontons.linear import chunks, grid
 from amontons.linear.chunks import near_numbers
 from amontons.linear.grid import GridBlocks
-from amontons.linear.vectors import BESIDE, LEFT_OUT, advance, dot, norm, norms_of
+from amontons.linear.vectors import (
+    BESIDE,
+    LEFT_OUT,
+    advance,
+    copy_both,
+    dot,
+    norm,
+    norm_of_rest,
+    norms_of,
+)
 from amontons.mechanics.elements import slabs
 from amontons.mechanics.elements.elasticity import stiffness as stiffness_of
 from amontons.mechanics.model import assembly
@@ -238,6 +247,11 @@ def test_sums():
     *_, size, _, r = same(run)
     assert size == pytest.approx(float(np.linalg.norm(b - 0.3 * a)), rel=1e-13)
     np.testing.assert_allclose(r, b - 0.3 * a, rtol=1e-15, atol=1e-15)
+    c = rng.standard_normal(40_000)
+    size = float(np.linalg.norm(a - b - c))
+    assert same(lambda: (norm_of_rest(a, b, c),)) == pytest.approx([size], rel=1e-13)
+    copy_both(a, first := np.empty_like(a), b, second := np.empty_like(b))
+    assert (first == a).all() and (second == b).all()
     at_nodes = rng.standard_normal((60_000, 3))
     kind = rng.integers(0, 3, 60_000).astype(np.int8)
     expected = [np.linalg.norm(at_nodes[some]) for some in (kind != LEFT_OUT, kind == BESIDE)]

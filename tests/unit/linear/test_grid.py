@@ -137,6 +137,9 @@ def test_rows_of_its_own(unstored):
     np.testing.assert_allclose(y, x, atol=1e-12)
     y, r = np.empty_like(x), np.empty_like(x)
     own.first_smooth(b, y, r)
+    zero = np.zeros_like(x)
+    own.smooth(b, zero, np.zeros(A.nodes, dtype=bool), False)
+    np.testing.assert_array_equal(y, zero)
     whole.times(y, x)
     np.testing.assert_allclose(r, (b - x) * used, atol=1e-12 * np.abs(b).max())
 
@@ -155,6 +158,8 @@ def test_interpolation_in_a_box_without_a_matrix(cells):
         np.testing.assert_allclose(out, fine + level @ coarse, atol=1e-14)
         P.restrict(fine, back := np.empty_like(coarse))
         np.testing.assert_allclose(back, level.T @ fine, atol=1e-13)
+        few = np.where(fine[:, 1] > 1, fine[:, 0], 0.0)
+        np.testing.assert_array_equal(P.restrict_few(few), P.scalar().T @ few)
 
 
 def test_rigid_modes_are_those_of_the_stored_matrix(monkeypatch):

@@ -129,9 +129,10 @@ class ContactMultigrid:
     ) -> Iterates:
         tangent = Tangent(levels.truncation)
         x = levels.start(problem, start)
+        finest = levels.finest(problem)
         if self.nested and start.v is None:
-            self._nested_start(levels, tangent, problem, x)
-        run = _Run(levels, tangent, self, levels.finest(problem), 0)
+            self._nested_start(levels, tangent, problem, x, finest[1])
+        run = _Run(levels, tangent, self, finest, 0)
         run.goal, own = CLOSE * target.tolerance, []
         for error in run.cycles(x):
             own.append(error)
@@ -154,10 +155,15 @@ class ContactMultigrid:
                 run.goal = CLOSE * error * share
 
     def _nested_start(
-        self, levels: ContactLevels, tangent: Tangent, problem: FrictionProblem, x: Array
+        self,
+        levels: ContactLevels,
+        tangent: Tangent,
+        problem: FrictionProblem,
+        x: Array,
+        f: Array,
     ) -> None:
-        """Add to x what the coarser levels find, from the coarsest one up."""
-        coarse = levels.coarse_problems(problem, x)
+        """Add to x what the coarser levels find, from the coarsest one up; f: load of nodes."""
+        coarse = levels.coarse_problems(problem, x, f)
         correction: Array | None = None
         for k in range(len(coarse), 0, -1):
             contacts, f = coarse[k - 1]

@@ -70,19 +70,20 @@ class ContactLevels:
 
     # ------------------------------------------------------------------ coarser levels
     def coarse_problems(
-        self, problem: FrictionProblem, x: Array
+        self, problem: FrictionProblem, x: Array, f: Array
     ) -> list[tuple[ContactNodes, Array]]:
         """Contacts and load of the coarser levels for a correction of x, that of the guess.
 
+        f: the load at the nodes, (nodes, 3), whose padding becomes zero.
         Galerkin loads; gaps at the contacts that sit on coarse nodes; Tresca's bounds summed.
         """
         if not self.coarse:
             return []
         assert problem.w is not None and problem.f is not None
-        levels, load = self.hierarchy.levels, problem.f
+        levels = self.hierarchy.levels
         if problem.guess is not None:
-            load = load - problem.times_M(problem.guess)
-        f = self.nodes.spread(self.basis.to_load(load))
+            load = problem.f - problem.times_M(problem.guess)
+            f = self.nodes.spread(self.basis.to_load(load))
         w = spatial(problem.w) + np.einsum("kai,ka->ki", self.contacts.H, x[self.contacts.node])
         bound = np.zeros(levels[0].A.nodes)
         bound[self.contacts.node] = problem.law.parameters[:, BOUND]
@@ -91,9 +92,9 @@ class ContactLevels:
         for k, (kept, contacts) in enumerate(self.coarse):
             P = levels[k].P
             assert P is not None
-            restricted = np.zeros((P.coarse, 3))
+            restricted = np.empty((P.coarse, 3))
             P.restrict(f, restricted)
-            bound = P.scalar().T @ bound
+            bound = P.restrict_few(bound)
             law = problem.law.at(kept).with_bounds(bound[contacts.node])
             out.append((contacts.under(law, w[kept], contacts.rho), restricted))
             f = restricted

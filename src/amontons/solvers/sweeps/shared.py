@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...core.compiled import njit
-from ...core.threads import Range, over_blocks, shared, split
+from ...core.threads import FINER, Range, over_blocks, shared, split
 from .chunks import SUMMED, stages_of
 from .kernels import (
     Sweep,
@@ -68,8 +68,12 @@ class SharedSweep:
 
 
 def _joined(chunks: list[Range], work: float) -> list[Range]:
-    """Chunks that follow one another, joined to one range for each thread."""
-    return [(chunks[a][0], chunks[b - 1][1]) for a, b in split(len(chunks), work)]
+    """Chunks that follow one another, joined to some ranges for each thread.
+
+    More than elsewhere: these take milliseconds, of which late threads leave more to others.
+    """
+    parts = split(len(chunks), work, finer=2 * FINER)
+    return [(chunks[a][0], chunks[b - 1][1]) for a, b in parts]
 
 
 def sweeps(s: Sweep, r: Array, count: int, watch: Array) -> int:
