@@ -1,8 +1,9 @@
 """Contact fields at the nodes of both sides of all pairs, for viewers.
 
 What a master node shows are means over the contacts that act on it.  With N the weight of the
-node in a contact of area w, its share is N w, and its force the one that the contact's rows
-give it: the forces of both sides cancel.
+node in a contact of area w, its share is |N| w: of second order, or where a contact covers a
+part of a facet, weights of either sign nearly cancel, and are no mean then.  Its force is the
+one that the contact's rows give it: the forces of both sides cancel.
 """
 
 from __future__ import annotations
@@ -30,7 +31,6 @@ Mask = NDArray[np.bool_]
 OFF = -1  # CSTATUS of nodes that are no contact; the other contact fields are zero there
 SLAVE, MASTER = 1, 2  # CSIDE, added up where a node is both
 NONE = 1e-9  # weight of a node in a contact that is none
-LEAST = 0.1  # of the sum of sizes of shares, below which their sum, signs and all, is no mean
 
 
 @dataclass(frozen=True, eq=False)
@@ -147,25 +147,23 @@ def _masters(slaves: _Side, onto: Onto, numbers: Index, fields: ContactFields) -
     node, contact = (np.asarray(each, dtype=np.int64) for each in N.coords)
     some, index = np.unique(node, return_inverse=True)
     chosen = numbers[contact]
-    share = N.data * fields.weights[chosen]
-    size = np.bincount(index, np.abs(share))
-    area = np.maximum(np.bincount(index, share), LEAST * size)
+    share = np.abs(N.data) * fields.weights[chosen]
+    area = np.bincount(index, share)
 
     def mean(values: Array) -> Array:
         columns = values[chosen].reshape(len(chosen), -1)
         sums = [np.bincount(index, share * column) for column in columns.T]
         return (np.stack(sums, axis=1) / area[:, None]).reshape(len(some), *values.shape[1:])
 
-    force = onto.force[some]
     main = np.empty(len(some), dtype=np.int64)
     order = np.argsort(share, kind="stable")
     main[index[order]] = chosen[order]  # the last one, with the largest share, stays
     shear = np.einsum("ik,ikc->ic", fields.shear, fields.frames[:, 1:])
     return [_Side(
         onto.nodes[some], np.full(len(some), MASTER), slaves.status[main],
-        slaves.sliding[main], mean(fields.gap), mean(fields.pressure),
-        np.maximum(mean(slaves.slip), 0.0), np.maximum(mean(slaves.path), 0.0),
-        np.maximum(mean(slaves.work), 0.0), -mean(shear), force / area[:, None], force,
+        slaves.sliding[main], mean(fields.gap), mean(fields.pressure), mean(slaves.slip),
+        mean(slaves.path), mean(slaves.work), -mean(shear),
+        -mean(shear + fields.pressure[:, None] * fields.frames[:, 0]), onto.force[some],
     )]  # fmt: skip
 
 

@@ -8,6 +8,7 @@ from scipy import sparse
 
 import amontons as am
 from amontons.analysis.paths.continuation import Continuation, Switch, resumed
+from amontons.analysis.paths.corrector import Curve
 from amontons.analysis.paths.diagram import bifurcation_diagram
 from amontons.analysis.paths.first_order import first_order
 from amontons.analysis.paths.following import (
@@ -380,3 +381,43 @@ def test_a_corrector_that_fails_says_so():
     branch = continue_both(broken, np.zeros(1), 0.0, Limits((0.0, 1.0)))
     assert branch.stops[1] is Stop.LOST
     assert branch.points[-1].parameter == pytest.approx(0.5, abs=1e-5)
+
+
+class Bars:
+    """Bars in series of stresses k l (1 - l^2) / 2 = p, with nothing left at l = 0."""
+
+    def __init__(self, *stiffness):
+        self.stiffness = np.array(stiffness)
+
+    def residual(self, y, p):
+        if y.min() <= 0:
+            return np.full(y.shape, np.inf)
+        return self.stiffness * y * (1 - y**2) / 2 - p
+
+    def jacobian(self, y, p):
+        if y.min() <= 0:
+            raise np.linalg.LinAlgError("pressed flat")
+        return np.diag(self.stiffness * (1 - 3 * y**2) / 2), -np.ones(y.shape)
+
+    def piece(self, y, p):
+        return "all"
+
+
+@pytest.mark.parametrize("stiffness", [(1.0,), (1.0, 1.6), (1.0, 1.0), (1.6, 1.0, 1.0)])
+@pytest.mark.parametrize("step", [0.02, 0.3])
+def test_a_fold_is_told_where_bars_alike_give_way_together(stiffness, step):
+    """At 1 / sqrt 3 of their length, where tangents are several; the path ends at nothing."""
+    options = am.Continuation(step=step, max_step=step)
+    branch = am.follow(Bars(*stiffness), start=np.ones(len(stiffness)), at=0.0,
+                       interval=(-0.1, 0.5), options=options)  # fmt: skip
+    (fold,) = branch.folds
+    assert fold.parameter == pytest.approx(1 / (3 * np.sqrt(3)), rel=1e-6)
+    assert branch[-1].parameter == pytest.approx(0.0, abs=1e-6)
+
+
+def test_newton_steps_that_end_where_there_is_no_derivative_find_nothing():
+    bar, tolerances = Bars(1.0), am.Continuation().tolerances
+    curve = Curve(bar, 1)
+    for far in (1e-13, 1e-3):
+        assert curve.correct(np.array([far]), -far, np.zeros(1), 1.0, tolerances) is None
+    assert corrected(bar, np.array([far]), -far) is None

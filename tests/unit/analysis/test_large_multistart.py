@@ -61,3 +61,19 @@ def test_starts_and_time_are_limits():
     assert found.starts == 3
     with pytest.raises(am.NotConverged, match="multistart: no solution to begin with"):
         am.multistart(block(0.4), time_limit=1e-9)
+
+
+def test_a_triangle_of_one_free_node():
+    """Fewer unknowns than there are modes to begin from."""
+    mesh = am.Mesh(
+        np.array([[-1, 0], [1.0, 0], [0.2, -1]]), (am.Cells("tri", [[0, 2, 1]]),),
+        {"held": (am.Facets("line", [[0, 1]]),),
+         "side": (am.Facets("line", [[1, 2], [2, 0]]),)},
+    )  # fmt: skip
+    contact = am.Contact("side", am.Plane((0, 1), (0, -1)), mu=0.5,
+                         where=lambda x: x[:, 1] < -0.9)  # fmt: skip
+    model = am.Model([am.Body(mesh, am.NeoHookean(1.0, 0.3))], [am.Fix("held", (0.1, -0.2))],
+                     [contact])  # fmt: skip
+    found = am.multistart(model, starts=8)
+    assert len(found) == 1
+    assert not found.complete

@@ -75,6 +75,27 @@ def test_masters_show_contact_where_it_is_now(ends):
         assert total == pytest.approx(abs(found.resultant[1]), rel=1e-9)
 
 
+@pytest.mark.parametrize("at", [0.15, 0.3, 0.45])
+def test_masters_of_second_order_show_no_more_than_acts_on_them(at):
+    """Weights of corners that a pair covers by a part cancel: what is left is no mean."""
+    low = am.Body(am.box((4, 1), (9, 2), origin=(-1, -1)), am.NeoHookean(1.0, 0.3), name="low",
+                  order=2)  # fmt: skip
+    up = am.Body(am.box((1, 0.6), (4, 2)), am.NeoHookean(6.0, 0.3), name="up", order=2)
+    held = [am.Fix("low.bottom", 0), am.Fix("up.top", (at, -0.1))]
+    model = am.Model([low, up], held, [am.Contact("up.bottom", master="low.top", mu=0.3)])
+    found = am.solve(model)
+    starts = np.cumsum([0, *(len(body.mesh.points) for body in model.bodies)])
+    fields = contact_fields(model, found.fields, found.solution.sliding, starts)
+    slave, master = fields["CSIDE"] == 1, (fields["CSIDE"] == 2) & (fields["CSTATUS"] >= 0)
+    on = master & (np.abs(fields["CFORCE"]).max(axis=1) > 0)
+    assert on.sum() >= 4
+    for name in ("CPRESS", "CSHEAR", "COPEN", "CSLIP"):
+        low_, high = fields[name][slave].min(), fields[name][slave].max()
+        assert low_ - 1e-12 <= fields[name][on].min() <= fields[name][on].max() <= high + 1e-12
+    length = np.linalg.norm(fields["CTRACTION"], axis=1)
+    assert length[on].max() <= length[slave].max() + 1e-12
+
+
 def test_what_slides_shows_its_slip_on_both_sides(tmp_path):
     flat = pressed(2)
     model = am.Model(flat.bodies, [am.Fix("low.bottom", 0), am.Fix("up.top", (0.5, -0.02))],

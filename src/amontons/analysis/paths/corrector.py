@@ -134,6 +134,8 @@ class Curve:
             ty, tp = self.unit(answer[:-1, 1], float(answer[-1, 1]))
             if self.length(dy, dp) <= max(tolerances.change, UNIT * self.length(y, p)):
                 rest = float(np.linalg.norm(self.residual(y, p)))
+                if not np.isfinite(rest):  # nor are derivatives, as in inverted cells
+                    return None
                 if rest <= tolerances.residual or rest <= self.rounding(y, p):
                     return Spot(y, p, ty, tp, factor.sign), count
         return None

@@ -285,8 +285,8 @@ def corrected(
     """
     tolerance = max(tolerance, resolution_of(problem))
     for _ in range(steps):
-        jacobian, _ = problem.jacobian(y, p)
-        try:
+        try:  # a step may also lead to where there is no derivative, as in inverted cells
+            jacobian, _ = problem.jacobian(y, p)
             change = solve_linear(jacobian, -problem.residual(y, p))
         except np.linalg.LinAlgError:
             return None

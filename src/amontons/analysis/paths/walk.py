@@ -183,10 +183,13 @@ class Walk(ABC):
         whole = self.curve.product(spot.y - self.spot.y, spot.p - self.spot.p,
                                    self.spot.ty, self.spot.tp)  # fmt: skip
 
+        known: list[Spot] = []
+
         def value(step: float) -> float:
             found = at(step)
             if found is None:
                 raise ArithmeticError
+            known.append(found)
             return float(test(found))
 
         try:
@@ -196,8 +199,8 @@ class Walk(ABC):
                 return None
             zero: Any = brentq(value, 0.0, whole, xtol=1e-14, rtol=np.float64(1e-14))
             return at(float(zero))
-        except ArithmeticError:
-            return None
+        except ArithmeticError:  # no tangent there, as where bodies alike give way together
+            return min(known, key=lambda s: abs(test(s)), default=None)
 
     def _end_of_interval(self, spot: Spot) -> Found:
         """The point at the end of the interval, corrected at fixed parameter."""

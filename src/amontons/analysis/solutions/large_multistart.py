@@ -126,11 +126,16 @@ class _Search:
         """Softest modes (n, k) of the tangent at a known solution, largest entry 1."""
         if number not in self._modes:
             A = self._held(number)
-            count, begin = min(MODES, A.shape[0] - 2), np.ones(A.shape[0])
+            n = A.shape[0]
+            count = min(MODES, n)
             try:
-                modes = np.asarray(eigsh(A, count, sigma=0.0, v0=begin)[1])
+                if n <= 2 * MODES:  # too few for Lanczos' method
+                    values, modes = np.linalg.eigh(A.toarray())
+                    modes = modes[:, np.argsort(np.abs(values))[:count]]
+                else:
+                    modes = np.asarray(eigsh(A, count, sigma=0.0, v0=np.ones(n))[1])
             except (ArpackError, RuntimeError):  # singular: no softest mode is to be had
-                modes = self.rng.standard_normal((A.shape[0], count))
+                modes = self.rng.standard_normal((n, count))
             self._modes[number] = modes / np.abs(modes).max(axis=0)
         return self._modes[number]
 
