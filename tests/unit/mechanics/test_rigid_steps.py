@@ -220,6 +220,9 @@ def test_gravity_in_time_is_that_of_the_middle_of_a_step():
     bad = RigidBodies([ball], gravity=lambda t: (0, 0, np.nan if t > 0.1 else -1))
     with pytest.raises(am.InvalidInput, match="gravity"):
         last(bad, 1e-2, 1.0)
+    bad = RigidBodies([ball], gravity=lambda t: (0, 0, -1 / (t < 0.1)))
+    with pytest.raises(am.InvalidInput, match=r"gravity\(t\) failed at t = 0.1.*Zero"):
+        last(bad, 1e-2, 1.0)
 
 
 def test_a_pendulum_swings_about_its_joint():

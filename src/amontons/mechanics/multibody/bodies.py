@@ -190,7 +190,14 @@ class RigidBodies(KeepsLocks):
         """The acceleration (3,) at a time; raises InvalidInput for what is none."""
         if not callable(self.gravity):
             return np.asarray(self.gravity)
-        return _acceleration(self.gravity(time), f" at t = {time:g}")
+        try:
+            given = self.gravity(time)
+        except Exception as error:  # of the user's function, without a common base
+            raise InvalidInput(
+                f"gravity(t) failed at t = {time:g}: {type(error).__name__}: {error}",
+                ("gravity",),
+            ) from error
+        return _acceleration(given, f" at t = {time:g}")
 
     @cached_property
     def packed(self) -> Packed:
