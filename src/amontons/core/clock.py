@@ -22,6 +22,7 @@ from numba.core import event
 from .errors import InvalidInput, TimeUp
 from .interrupts import hold, release
 from .onlookers import seconds_until_end
+from .quick import made
 from .telling import told
 
 
@@ -114,7 +115,9 @@ class Deadline:
     @classmethod
     def after(cls, seconds: float | None) -> Deadline:
         """So many seconds from now by the clock; never without a number."""
-        return NEVER if seconds is None else cls(now() + seconds, None, float(seconds))
+        if seconds is None:
+            return NEVER
+        return made(cls, moment=now() + seconds, work=None, seconds=float(seconds))
 
     @classmethod
     def counted(cls, seconds: float) -> Deadline:

@@ -27,6 +27,7 @@ from .auto.first_stage import (
     HIDDEN,
     START,
     SWEEPS,
+    WORK,
     WORST,
     Together,
 )
@@ -114,7 +115,7 @@ def told(
     flops = mine.judge_flops
     history = (Step(0, row[START] / size, 0, 0.0, None, flops),)
     if count:
-        flops += together.flops(p) + mine.judge_flops
+        flops += row[SWEEPS] * together.reads[p].flops + row[WORK] + mine.judge_flops
         history = (*history, Step(count, error, 0, seconds, None, flops, STAGE))
     record = made(
         Convergence, outcome=Outcome.CONVERGED, iterations=count, error=error,

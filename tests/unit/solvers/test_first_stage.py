@@ -5,6 +5,7 @@ import pytest
 
 import amontons as am
 from amontons.solvers.auto.first_stage import first_chunks
+from amontons.solvers.auto.tracks import EARLY, LEAST, sweeps_on_stacks
 from amontons.solvers.sweeps.kernels import (
     Acceleration,
     SweepOrder,
@@ -66,3 +67,10 @@ def test_records_are_whole():
     assert not found.u.flags.writeable
     assert found.warnings == ()
     assert len(found.pattern) == 60
+
+
+def test_on_stacks_the_first_chunk_is_shorter_where_sweeps_are_dear():
+    counts = [sweeps_on_stacks(cost) for cost in (5e3, 2e4, 1e6)]
+    assert counts[0] == LEAST
+    assert EARLY <= counts[1] <= LEAST
+    assert counts[2] == EARLY

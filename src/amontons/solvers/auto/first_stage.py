@@ -49,7 +49,7 @@ from .state import (
     nanoseconds_of_sweep,
     visits,
 )
-from .tracks import DEPTH, LEAST
+from .tracks import DEPTH, LEAST, sweeps_on_stacks
 
 Array = NDArray[np.float64]
 Counts = NDArray[np.int64]
@@ -58,7 +58,6 @@ Counts = NDArray[np.int64]
 # which it is, what rounding hides, whether reactions were made to keep to their statuses,
 # operations on single contacts and of judgements.  Errors of all in the unit of u.
 LIMIT, GOAL, WEAKEST, SWEEPS, START, ERROR, WORST, CONTACT, HIDDEN, CHANGED, WORK = range(11)
-NOTHING = [math.inf] * (WORK - WEAKEST)  # is told yet
 NO_NUMBERS = read_only(np.empty(0))
 GRAM = (DEPTH + 1) * DEPTH
 # numbers of a memory beside its vectors: gram, watch (3,), count (2,), whether it is weak
@@ -207,13 +206,15 @@ def solve_range(first, last, sizes, table, data, floor, r, u, states, memory):  
 class Read(NamedTuple):
     """What `solve_range` reads of a problem; sizes (2, 3).
 
-    flops: operations of an accelerated sweep, without those on single contacts.
+    flops: operations of an accelerated sweep, without those on single contacts.  light: whether
+    all of it is made here (`is_light`).
     """
 
     sizes: Counts
     data: tuple[Any, ...]
     floor: Array
     flops: float
+    light: bool
 
 
 def read_of(problem: FrictionProblem) -> Read:
@@ -225,7 +226,8 @@ def read_of(problem: FrictionProblem) -> Read:
     contacts, count = problem.contacts, len(blocks.indices)
     sizes = np.array([(0, 0, 0), (contacts, count, full.size)], np.int64)
     flops = flops_of_sweep(count, contacts) + flops_of_acceleration(3 * contacts, DEPTH)
-    return Read(sizes, arrays, read_only(np.array(problem.floor)), flops)
+    floor = read_only(np.array(problem.floor))
+    return Read(sizes, arrays, floor, flops, is_light(problem))
 
 
 def _joined(arrays: Sequence[NDArray]) -> NDArray:
@@ -235,10 +237,11 @@ def _joined(arrays: Sequence[NDArray]) -> NDArray:
 
 def chunks_of(problem: FrictionProblem, tolerance: float) -> Iterator[int]:
     """Sweeps of each of the chunks that are made of a problem here."""
-    first, *others = first_chunks(len(problem.blocks.indices), problem.contacts)
-    yield first
+    blocks, contacts = len(problem.blocks.indices), problem.contacts
     if is_brief(problem, tolerance) or chunks_alone(problem) > 1:
-        yield from others
+        yield from first_chunks(blocks, contacts)
+    else:
+        yield sweeps_on_stacks(nanoseconds_of_sweep(blocks, contacts, HISTORY_CONTACT))
 
 
 @dataclass(eq=False)
@@ -257,7 +260,7 @@ class Together:
     def __post_init__(self) -> None:
         self.reads = reads = [problem.kept_alone(read_of) for problem in self.problems]
         if len(reads) == 1:
-            self.sizes, self.data, self.floor, _ = reads[0]
+            self.sizes, self.data, self.floor = reads[0][:3]
         else:
             ends = np.cumsum([read.sizes[1] for read in reads], axis=0)
             self.sizes = np.concatenate([reads[0].sizes[:1], ends])
@@ -265,12 +268,12 @@ class Together:
                 _joined(same) for same in zip(*(read.data for read in reads), strict=True)
             )
             self.floor = _joined([read.floor for read in reads])
-        self.table = np.array([self._row(problem) for problem in self.problems])
+        self.table = np.empty((len(reads), WORK + 1))
+        self.table.fill(math.inf)  # nothing is told yet
+        for row, problem, read in zip(self.table, self.problems, reads, strict=True):
+            row[LIMIT], row[GOAL] = 0.0, self.tolerance * problem.q_norm
+            row[WEAKEST] = self.weakest if read.light else math.inf
         self.u, self.states = np.empty((len(self.r), 3)), np.empty((2, len(self.r)), np.int8)
-
-    def _row(self, problem: FrictionProblem) -> list[float]:
-        weakest = self.weakest if is_light(problem) else math.inf
-        return [0.0, self.tolerance * problem.q_norm, weakest, *NOTHING]
 
     def solve(self, first: int, last: int) -> None:
         """Solve some of the problems as far as the first stage goes."""

@@ -26,9 +26,9 @@ rest counts C / (GRACE F) times.  Besides
                 while it promises the goal for less than to let them in costs
     stacks      where most contacts share faces of rigid bodies, reactions are many more than
                 balances: the method that solves such a problem at rest in a few steps follows
-                the first chunk, unless the first track promises to be there for less, and has
-                what it usually needs before all others; where chunks are brief it waits with
-                the others, and comes before them
+                the first chunk, a shorter one, unless the first track promises to be there for
+                less, and has what it usually needs before all others; where chunks are brief it
+                waits with the others, and comes before them
     dear        the interior point, smoothing Newton, and steps and sweeps in turn, begin where
                 sweeps have cost as much as all steps and what smoothing Newton, or the latter,
                 usually need: where none helps these trials cost no more than sweeps do
@@ -74,7 +74,7 @@ LOST, LOST_STEPS, LOST_CUBED, LOST_MOST, LOST_CHUNKS = 5.0, 1000.0, 2e6, 2e9, 50
 BESIDE = 10.0  # times the best error up to which a track's own progress counts as that of all
 # Cost between two iterates that are handed out, of all cost, and its bounds in nanoseconds: the
 # driver's judgement costs more than a chunk of a small problem, but it looks at the clock.
-PAUSE, LEAST_PAUSE, MOST_PAUSE = 0.1, 1e6, 5e7
+PAUSE, LEAST_PAUSE, MOST_PAUSE = 0.1, 5e6, 5e7
 
 
 @dataclass(frozen=True)

@@ -208,32 +208,32 @@ class State:
         less = self.work.symbolic.products - self.work.sharing.products
         return self.step_cost - PRODUCT * less
 
-    @property
+    @cached_property
     def alternation_cost(self) -> float:
         """Nanoseconds of a Newton step in turn with sweeps, the calls about it included."""
         return self.step_cost + LINEARISED
 
-    @property
+    @cached_property
     def dense_step_cost(self) -> float:
         """Nanoseconds of a Newton step that factorises the whole of W as a full matrix."""
         return DENSE_STEP * float(3 * self.problem.contacts) ** 3
 
-    @property
+    @cached_property
     def sweep_cost(self) -> float:
         """Nanoseconds of a sweep."""
         return self._cost()
 
-    @property
+    @cached_property
     def accelerated_cost(self) -> float:
         """Nanoseconds of an accelerated sweep."""
         return self._cost(HISTORY_CONTACT)
 
-    @property
+    @cached_property
     def deep_cost(self) -> float:
         """Nanoseconds of a sweep with a deep memory."""
         return self._cost(DEEP_CONTACT)
 
-    @property
+    @cached_property
     def momentum_cost(self) -> float:
         """Nanoseconds of a sweep with momentum."""
         return self._cost(MOMENTUM_CONTACT)

@@ -26,7 +26,8 @@ from ..sweeps.kernels import Acceleration, counted, sweep_data, watch_for
 from ..sweeps.momentum import Momentum
 from ..sweeps.shared import sweeps as shared_sweeps
 from .chunk import Chunk, Chunks
-from .state import State
+from .race import ENTRY
+from .state import State, chunks_alone
 
 Array = NDArray[np.float64]
 DEPTH = 10  # past sweeps that Anderson acceleration combines
@@ -35,6 +36,7 @@ NEARER = 0.3  # error of that, of the track's own, at which it begins again from
 PATIENT = 600  # sweeps without halving its error, after which any better one will do
 TAKEN = 0.1  # error of the best reaction, of its own, at which a track goes on from that
 LEAST = 20  # sweeps of a chunk: a judgement costs as much as one
+EARLY = 10  # of the first one on stacks, see `sweeps_on_stacks`
 BETWEEN = 200  # accelerated sweeps after each relaxation, and on while they halve the error
 RELAXED = 60  # steps of one relaxation at most
 # First smoothing, times the error per contact of the reaction that it starts from, or 0, from
@@ -51,6 +53,14 @@ def aimed(watch: Array, goal: float) -> None:
     """Let sweeps go on where the goal has become another one."""
     if watch[0] != goal:
         watch[:] = watch_for(goal)
+
+
+def sweeps_on_stacks(cost: float) -> int:
+    """Of the first chunk on stacks of rigid bodies, where others may be much quicker then.
+
+    cost: of one, ns; fewer, down to EARLY, where all cost more than to let others in.
+    """
+    return max(EARLY, min(int(ENTRY / cost), LEAST))
 
 
 def momentum(state: State) -> Chunks:
@@ -83,18 +93,21 @@ def anderson(state: State) -> Chunks:
     What the first stage has done is taken from there.
     """
     memory, watch = Acceleration(state.data, state.start, DEPTH), watch_for(state.goal)
-    cost, begun = state.accelerated_cost, state.begun
+    cost, begun, least = state.accelerated_cost, state.begun, LEAST
     turn = yield Chunk(memory.r, 0, 0.0)
     if begun is not None:
         for r, count, flops, error in begun.chunks:
             turn = yield Chunk(r, count, cost * count, flops, error)
         memory.x, memory.history, memory.gram, memory.count = begun[2:6]
         memory.r, watch = begun.chunks[-1].r.copy(), begun.watch
+    elif chunks_alone(state.problem) == 1:
+        least = sweeps_on_stacks(cost)
     while True:
         if state.error < TAKEN * turn.error:
             memory, watch = Acceleration(state.data, state.r, DEPTH), watch_for(state.goal)
         aimed(watch, state.goal)
-        count, flops = memory.sweep(max(LEAST, int(turn.cost / cost)), watch)
+        count, flops = memory.sweep(max(least, int(turn.cost / cost)), watch)
+        least = LEAST
         turn = yield Chunk(memory.r.copy(), count, cost * count, flops, watch[2])
 
 
@@ -136,16 +149,16 @@ def relaxed(relaxation: float, state: State) -> Chunks:
 # ---------------------------------------------------------------- Newton's kind
 def interior_point(state: State) -> Chunks:
     """Steps on the relaxation without sliding, sweeps, those with the sliding found, and on."""
-    solver, problem = InteriorPoint(), state.problem
+    problem = state.problem
     slip = np.zeros(problem.contacts)
     if state.start.any():
         slip = sliding_speed(problem, state.start[:, : problem.dimension])
     turn = yield Chunk(state.start, 0, 0.0)
     while True:
-        relaxation, done = Relaxation.of(state.work, slip, solver.shift), 0
+        relaxation, done = Relaxation.of(state.work, slip, InteriorPoint.shift), 0
         while done < RELAXED:
             each = state.relaxation_cost if relaxation.shares else state.step_cost
-            steps = int(np.clip(turn.cost / each, 1, RELAXED - done))
+            steps = max(1, min(int(turn.cost / each), RELAXED - done))
             count = relaxation.advance(state.goal, state.affordable(steps))
             done += count
             turn = yield Chunk(relaxation.r.copy(), max(count, 1), max(count, 1) * each)
