@@ -11,6 +11,7 @@ from ..contact.current_mortar import MortarMeeting
 from ..contact.current_pairs import Meetings
 from ..contact.shared import HARDLY
 from ..elements.hyperelasticity import HyperelasticBody
+from .flat_cells import flat_in_words
 from .nonlinear_parts import NonlinearParts
 from .worst_cells import flattest, turned_corner
 
@@ -87,7 +88,9 @@ def _flat(parts: NonlinearParts, u: Array) -> Iterator[str]:
     for name, body, own in each:
         if isinstance(body, HyperelasticBody):
             least, cell = flattest(body.mesh, own)
-            if least < FLAT:
+            if told := flat_in_words(body.mesh, body.material, name, own):
+                yield told
+            elif least < FLAT:
                 yield f"{cell} of body {name!r} is pressed to det F = {least:.3g}"
             if corner := turned_corner(body.mesh, own):
                 yield f"{corner} in body {name!r}"
