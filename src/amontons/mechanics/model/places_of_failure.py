@@ -17,6 +17,7 @@ from .worst_cells import flattest, turned_corner
 
 Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]
+COVERED = 0.9  # of a master's facet: seen along the slave's normals it is smaller
 FLAT = 0.5  # det F below which a cell is worth a word
 LEFT = 0.5  # of what a node bore for itself, `fading`, below which it is worth a word
 
@@ -69,7 +70,7 @@ def _hanging(here: MortarMeeting, bears: Mask) -> int | None:
     bearing[here.slaves[rows]] = True
     whole = np.zeros(len(skin.nodes), dtype=bool)
     whole[shared.facets] = shared.covered >= 1
-    if (whole & bearing[skin.nodes].all(axis=1)).any():
+    if (whole & bearing[skin.nodes].all(axis=1)).any() or _bears_whole(here, bearing):
         return None
     ending[skin.rim] = True
     master = here.pair.master
@@ -77,6 +78,24 @@ def _hanging(here: MortarMeeting, bears: Mask) -> int | None:
     outer[skin.nodes[shared.slave[last]]] = True  # who faces the master's last facets
     ending[np.intersect1d(skin.nodes[~whole], np.flatnonzero(outer))] = True
     return int(rows[0]) if len(rows) and ending[bearing].all() else None
+
+
+def _bears_whole(here: MortarMeeting, bearing: Mask) -> bool:
+    """Whether slave facets all of whose nodes bear face a whole facet of the master.
+
+    bearing (nodes,); nodes that fade do not count: they bear what their neighbours do.
+    """
+    shared, master = here.shared, here.pair.master
+    fades = np.zeros(len(here.x), dtype=bool)
+    fades[here.slaves] = here.remembered < 1
+    nodes = here.pair.slave.nodes[shared.facets]
+    bears = (bearing[nodes] | fades[nodes] | ~shared.kept).all(axis=1)
+    bears &= (bearing[nodes] & shared.kept).any(axis=1)
+    pairs = np.flatnonzero(bears[shared.of])
+    faced = shared.cross[pairs, :, : master.nodes.shape[1]].sum(axis=(1, 2))
+    size = np.linalg.norm(master.areas(here.x), axis=1)
+    met = np.bincount(shared.master[pairs], faced, minlength=len(size))
+    return bool((met > COVERED * size).any())
 
 
 def _flat(parts: NonlinearParts, u: Array) -> Iterator[str]:
