@@ -19,17 +19,23 @@ Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]
 COVERED = 0.9  # of a master's facet: seen along the slave's normals it is smaller
 FLAT = 0.5  # det F below which a cell is worth a word
+FALLEN = 0.75  # of contact forces at the beginning of a step, below which a word is due
 LEFT = 0.5  # of what a node bore for itself, `fading`, below which it is worth a word
 
 
 def places_of_failure(
-    parts: NonlinearParts, u: Array, earlier: Meetings, closed: Mask
-) -> str:
+    parts: NonlinearParts, u: Array, earlier: Meetings, closed: Mask,
+    forces: tuple[Array, Array] | None = None,
+) -> str:  # fmt: skip
     """What may be wrong at displacements u (nodes, d), in words; "" where nothing is seen.
 
-    earlier: where sides met at the beginning of the step; closed (nc,): who bears.
+    earlier: where sides met at the beginning of the step; closed (nc,): who bears; forces
+    (nc, d): now and then, None where there were none then.
     """
-    told = [*_parted(parts.meet(u), earlier, closed), *_flat(parts, u)]
+    now = parts.meet(u)
+    told = [*_parted(now, earlier, closed), *_flat(parts, u)]
+    if forces is not None:
+        told += _fallen(now, *forces)
     return f"at the last state {', '.join(told)}" if told else ""
 
 
@@ -53,6 +59,21 @@ def _parted(now: Meetings, earlier: Meetings, closed: Mask) -> Iterator[str]:
             yield f"{names} {less}, as at ({_place(here, left[0])})"
         elif (edge := _hanging(here, bears)) is not None:
             yield f"{names} along an edge alone, as at ({_place(here, edge)})"
+
+
+def _fallen(now: Meetings, force: Array, before: Array) -> Iterator[str]:
+    """Pairs that press much less than at the beginning of the step, as where a body is lifted.
+
+    force, before (nc, d): of contacts now and then.
+    """
+    ends = np.cumsum([len(here.slaves) for here in now.parts])[:-1]
+    sizes = (np.split(np.linalg.norm(each, axis=1), ends) for each in (force, before))
+    for here, size, old in zip(now.parts, *sizes, strict=True):
+        part = size.sum() / max(old.sum(), np.finfo(float).tiny)
+        if isinstance(here, MortarMeeting) and old.any() and part < FALLEN:
+            yield ("contact forces on {!r} with {!r}".format(*here.pair.names)
+                   + f" have fallen to {100 * part:.2g} % within the step, the largest of "
+                   f"them is at ({_place(here, int(size.argmax()))})")  # fmt: skip
 
 
 def _place(here: MortarMeeting, row: int) -> str:
@@ -89,7 +110,7 @@ def _bears_whole(here: MortarMeeting, bearing: Mask) -> bool:
     fades = np.zeros(len(here.x), dtype=bool)
     fades[here.slaves] = here.remembered < 1
     nodes = here.pair.slave.nodes[shared.facets]
-    bears = (bearing[nodes] | fades[nodes] | ~shared.kept).all(axis=1)
+    bears = np.asarray((bearing[nodes] | fades[nodes] | ~shared.kept).all(axis=1))
     bears &= (bearing[nodes] & shared.kept).any(axis=1)
     pairs = np.flatnonzero(bears[shared.of])
     faced = shared.cross[pairs, :, : master.nodes.shape[1]].sum(axis=(1, 2))
