@@ -170,7 +170,8 @@ class Deadline:
 
     def within(self, seconds: float) -> Deadline:
         """This deadline, or one in so many seconds where that is earlier."""
-        return replace(self, moment=min(self.moment, self.time + seconds))
+        earlier = self.time + seconds
+        return replace(self, moment=earlier, seconds=seconds) if earlier < self.moment else self
 
     def __str__(self) -> str:
         early = seconds_until_end()

@@ -108,6 +108,21 @@ def test_locking_is_told_with_its_size(cells, kind, poisson):
     assert estimated(solution) == pytest.approx(factor, rel=0.15)
 
 
+@pytest.mark.parametrize(("method", "told"), [("mortar", False), ("nodal", True)])
+def test_second_order_helps_two_bodies_too(method, told):
+    """Averages know facets of second order, nodal contact does not."""
+    law = am.LinearElastic(1.0, 0.4999)
+    bodies = [am.Body(am.box((2, 1), (4, 2), origin=(0, at), kind="tri"), law, name=name)
+              for name, at in (("low", 0), ("up", 1))]  # fmt: skip
+    contact = am.Contact("up.bottom", master="low.top", mu=0.1, method=method)
+    supports = [am.Fix("low.bottom", 0), am.Fix("up.top", (0, -0.01))]
+    solution = am.solve(am.Model(bodies, supports, [contact]))
+    messages = [w.message for w in solution.warnings if w.name == "volumetric-locking"]
+    assert len(messages) == 2
+    assert all("order=2" in message for message in messages)
+    assert all(('of method "mortar"' in message) == told for message in messages)
+
+
 @pytest.mark.parametrize("law", [am.NeoHookean, am.CiarletGeymonat])
 def test_locking_at_finite_strains(law):
     coarse = am.solve(rubber(law(1.0, 0.499), (8, 4), press=0.1, integration="full"))

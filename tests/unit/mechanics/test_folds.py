@@ -115,8 +115,17 @@ def test_what_is_all_but_in_contact_is_of_one_side_as_far_as_it_goes(count, bend
     assert set(side[neck & ~upper]) == {1 - side[neck & upper][0]}
 
 
+def told(step):
+    """Warnings about masters inside the slave."""
+    return [w.message for w in step.warnings if w.name == "master-inside-slave"]
+
+
 def test_a_folded_beam_is_as_with_two_surfaces():
-    """Arms of a hairpin, pressed together and pulled along each other."""
+    """Arms of a hairpin, pressed together and pulled along each other.
+
+    The low one's end is held: its last facet would have one average alone as a slave, and the
+    other's tip go through it, with .4 of the force.
+    """
     def along(x, t):
         return 0.4 * max(t - 1, 0)
 
@@ -126,12 +135,28 @@ def test_a_folded_beam_is_as_with_two_surfaces():
     body = am.Body(hairpin(), am.NeoHookean(1.0, 0.3), name="beam")
     supports = [am.Fix("left", 0), am.Fix("press", (along, down))]
     found = []
-    for sides in (("beam.top", "beam.top"), ("low", "high")):
+    for sides in (("beam.top", "beam.top"), ("high", "low"), ("low", "high")):
         model = am.Model([body], supports, [am.Contact(sides[0], master=sides[1], mu=0.3)])
-        steps = list(am.evolve(model, am.QuasiStatic(0.2), until=1.4, tolerance=1e-11))
+        until = 0.8 if sides[0] == "low" else 1.4
+        steps = list(am.evolve(model, am.QuasiStatic(0.2), until=until, tolerance=1e-11))
+        assert [bool(told(step)) for step in steps] == [sides[0] == "low" and step is steps[-1]
+                                                        for step in steps]  # fmt: skip
+        if until < 1:
+            assert "carry no contact force, as where supports hold them" in told(steps[-1])[0]
+            continue
         found.append([np.sum(step.supports["press"].force[:2], axis=0) for step in steps])
         assert steps[-1].state.force[:, 0].max() > 1e-3
     np.testing.assert_allclose(found[0], found[1], rtol=1e-7, atol=1e-10)
+
+
+def test_an_end_that_goes_through_another_of_the_same_surface_is_told():
+    """Both ends are held: whichever is the slave has no force there."""
+    body = am.Body(hairpin(), am.NeoHookean(1.0, 0.3), name="beam")
+    supports = [am.Fix("left", 0), am.Fix("right", (0, -0.5))]
+    contact = am.Contact("beam.top", master="beam.top", mu=0.3)
+    (message,) = told(am.solve(am.Model([body], supports, [contact])))
+    assert "up to 0.156" in message
+    assert message.endswith("refine 'beam.top' there")
 
 
 @pytest.mark.parametrize("of", [hairpin, slotted, lambda: slotted(3), lambda: slotted(3, 2)])

@@ -10,10 +10,11 @@ from amontons.mechanics.model.places_of_failure import places_of_failure
 NEO = am.NeoHookean(1.0, 0.3)
 
 
-def bodies(dim, at):
-    """A block on a wider slab, moved along by `at`."""
+def bodies(dim, at, fine=1.0):
+    """A block on a wider slab, moved along by `at`; fine: of the slab."""
     deep = (1,) * (dim - 2)
-    boxes = [("lower", (2, *(2 * k for k in deep), 1), (10, *(6 * k for k in deep), 2),
+    cells = [round(fine * count) for count in (10, *(6 * k for k in deep))]
+    boxes = [("lower", (2, *(2 * k for k in deep), 1), (*cells, 2),
               (-0.5, *(-0.5 * k for k in deep), -1)),
              ("upper", (1, *deep, 1), (4, *(3 * k for k in deep), 2),
               (at, *(0 for _ in deep), 0))]  # fmt: skip
@@ -36,11 +37,12 @@ def problem_of(parts, *, exchanged):
     ("hangs over", True, False),  # or the master
     ("sags", False, False), ("sags", False, True),  # one node bears, and no side ends there
     ("lies", False, False), ("lies", False, True),
+    ("lies coarsely", False, True),  # on parts of the slab's facets, as slaves
 ])  # fmt: skip
 @pytest.mark.parametrize("dim", [2, 3])
 def test_what_bears_along_an_edge_alone_is_told(way, edge, exchanged, dim):
     """A block that leans on its edge, or hangs on the slab's by its underside."""
-    parts = bodies(dim, 1.0 if way == "hangs over" else 0.0)
+    parts = bodies(dim, 1.0 if way == "hangs over" else 0.0, 0.2 if "coarsely" in way else 1.0)
     problem, upper = problem_of(parts, exchanged=exchanged)
     X, u = problem.parts.X, np.zeros(problem.parts.X.shape)
     x, z = X[upper, 0], X[upper, -1]

@@ -133,7 +133,7 @@ def folded(
     slaves: Index, skin: Skin, free: Mask, x: Array, names: tuple[str, str] = ("slave", "slave")
 ) -> MortarPair:
     """One surface against itself, slaves (nc,) its nodes, undeformed at x (nodes, d)."""
-    fold = Fold.of(skin, x)
+    fold = Fold.of(skin, x, slaves)
     return MortarPair(slaves, *fold.skins, free, names, fold)
 
 

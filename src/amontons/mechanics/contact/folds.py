@@ -42,20 +42,30 @@ SLAVE, MASTER, NEITHER = 0, 1, -1
 
 @dataclass(frozen=True, eq=False)
 class Fold:
-    """A surface with its sides: skin, depth (f,) of the body below its facets, side (f,)."""
+    """A surface with its sides.
+
+    skin; depth (f,): of the body below its facets; held (f,): nodes of these that can carry no
+    force, as supports hold them; side (f,).
+    """
 
     skin: Skin
     depth: Array
+    held: Index
     side: Index
 
     @classmethod
-    def of(cls, skin: Skin, x: Array) -> Fold:
-        """The surface at the undeformed positions x (nodes, d)."""
+    def of(cls, skin: Skin, x: Array, carrying: Index | None = None) -> Fold:
+        """The surface at the undeformed positions x (nodes, d).
+
+        carrying: nodes that may carry forces, all of them by default.
+        """
         depth = np.full(len(skin.nodes), np.inf)
         for found in _opposite(skin, x, FAR):
             behind = (found.ahead < 0) & (found.back < 0) & (found.aside < 1)
             np.minimum.at(depth, found.one[behind], -found.ahead[behind])
-        return cls(skin, depth, np.zeros(len(skin.nodes), dtype=np.int64)).at(x)
+        held = skin.real & (carrying is not None) & ~np.isin(skin.nodes, carrying)
+        none = np.zeros(len(skin.nodes), dtype=np.int64)
+        return cls(skin, depth, held.sum(axis=1), none).at(x)
 
     def at(self, x: Array) -> Fold:
         """The same with the sides of the positions x (nodes, d)."""
@@ -75,7 +85,7 @@ class Fold:
         differs = sparse.coo_array(
             (unlike[tree.data.astype(np.int64) - 1], (tree.row, tree.col)), shape=(f, f)
         )
-        side = _coloured(sparse.csr_array(tree), sparse.csr_array(differs))
+        side = _coloured(sparse.csr_array(tree), sparse.csr_array(differs), self.held)
         return replace(self, side=np.where(takes_part, side, NEITHER))
 
     def _apart_as(self, x: Array, one: Index, other: Index, apart: Array) -> Array:
@@ -220,10 +230,11 @@ def _opposite(
         yield _Opposite(one[kept], other[kept], ahead[kept], back[kept], aside[kept])
 
 
-def _coloured(tree: sparse.csr_array, differs: sparse.csr_array) -> Index:
+def _coloured(tree: sparse.csr_array, differs: sparse.csr_array, held: Index) -> Index:
     """SLAVE or MASTER (f,) along a forest, the first facet of each tree a slave.
 
-    differs: edges of it whose ends are of different sides.
+    differs: edges of it whose ends are of different sides; held (f,): nodes that carry nothing,
+    more of which a master has.
     """
     f = tree.shape[0]
     out = np.full(f, -1, dtype=np.int64)
@@ -235,4 +246,7 @@ def _coloured(tree: sparse.csr_array, differs: sparse.csr_array) -> Index:
         out[first] = SLAVE
         for facet in order[1:]:
             out[facet] = out[before[facet]] ^ int(other_way[facet, before[facet]])
+        borne = out[order] == SLAVE
+        if held[order][borne].sum() > held[order][~borne].sum():
+            out[order] ^= 1
     return out

@@ -233,7 +233,7 @@ class HyperelasticBody:
     """
 
     def __init__(self, mesh: Mesh, material: Hyperelastic | Mapping[str, Hyperelastic]) -> None:
-        self.mesh = mesh
+        self.mesh, self.material = mesh, material
         laws = materials_by_region(mesh, material)  # type: ignore[arg-type]
         for region, law in laws.items():
             if not isinstance(law, Hyperelastic):

@@ -13,6 +13,7 @@ from ...core.warned import ResultWarning
 from .coefficients import like_percent
 from .deep_masters import deep_masters
 from .fields import ContactFields
+from .flat_cells import flat_cells, turned_cells
 from .held_facets import held_facets
 from .held_friction import held_friction
 from .loading import no_load
@@ -37,7 +38,14 @@ CHECKS: tuple[Check, ...] = (
 )
 AT_FIRST = (overlap_at_start,)  # of how bodies are given: said once
 OF_THE_START = (sliding_beyond_pairs, sliding_beyond_curvature)  # its pairs, normals
-OF_WHERE_NODES_ARE = (held_facets, held_friction, deep_masters, unfaced_slaves)  # found there
+OF_WHERE_NODES_ARE = (  # found there
+    held_facets,
+    held_friction,
+    deep_masters,
+    unfaced_slaves,
+    flat_cells,
+    turned_cells,
+)
 OF_MOTIONS = (large_rotation, *OF_THE_START, *OF_WHERE_NODES_ARE)
 
 

@@ -336,8 +336,10 @@ class LargeDeformation(NonlinearProblem):
 
     def remark(self, v: Array) -> str:
         """Which slaves face nothing of their masters, leave or hang on edges; what is flat."""
-        u, closed = self.displacement(v), self.contact_point(v).pieces % 4 > 0
-        return places_of_failure(self.parts, u, self.earlier, closed)
+        u, here = self.displacement(v), self.contact_point(v)
+        first = self.at_share(0.0).contact_point(self.known_state).force if self.known else None
+        return places_of_failure(self.parts, u, self.earlier, here.pieces % 4 > 0,
+                                 None if first is None else (here.force, first))  # fmt: skip
 
     def closed_pieces(self, v: Array) -> list[Pieces]:
         """The active pieces with touching contacts stuck, then with all of them stuck."""

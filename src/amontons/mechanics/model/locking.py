@@ -68,14 +68,15 @@ def _locking_kinds(mesh: Mesh, region: str, law: Material) -> set[str]:
 
 
 def _remedy(model: Model, kinds: set[str]) -> str:
-    """What helps: contact between bodies needs first order."""
+    """What helps; between bodies nodal contact alone needs first order."""
     simplices = {"tri": "quadrilaterals", "tet": "hexahedra"}
     other = [simplices[kind] for kind in sorted(kinds) if kind in simplices]
     hybrid = " or ".join(other) or 'integration "hybrid" of the cells (elements CPE4H, C3D8H)'
     finer = "a finer mesh (half the cell size: a quarter of the excess)"
-    if any(contact.master is not None for contact in model.contacts):
-        return f"{hybrid}, or {finer}"
-    second = "second order (Body(..., order=2), in case files order = 2 in [mesh])"
+    pairs = [contact for contact in model.contacts if contact.master is not None]
+    nodal = any(contact.method == "nodal" for contact in pairs)
+    how = ', contact of method "mortar"' if nodal else ""
+    second = f"second order (Body(..., order=2){how}, in case files order = 2 in [mesh])"
     return f"{second}, {hybrid}, or {finer}"
 
 

@@ -23,13 +23,13 @@ def flattest(mesh: Mesh, u: Array) -> tuple[float, str]:
             ratio = determinant(cell.jacobians(moved, at)) / determinant(cell.jacobians(x, at))
             k = int(np.where(np.isfinite(ratio), ratio, -np.inf).argmin())
             if not ratio[k] >= least:
-                least, told = float(ratio[k]), _told(first + k, x[k])
+                least, told = float(ratio[k]), cell_in_words(first + k, x[k])
         first += len(cells.nodes)
     return least, told
 
 
 def turned_corner(mesh: Mesh, u: Array) -> str:
-    """The corner that is turned inside out the most at displacements u (n, dim), in words.
+    """The node of a cell that is turned inside out the most at u (n, dim), in words.
 
     "" for none.  Integration points may all be in front of it: energies do not feel it.
     """
@@ -42,9 +42,10 @@ def turned_corner(mesh: Mesh, u: Array) -> str:
             k = int(np.where(np.isfinite(ratio), ratio, np.inf).argmin())
             if ratio[k] < least:
                 least, place = float(ratio[k]), ", ".join(f"{c:.4g}" for c in x[k, c])
+                part = "corner" if c < cell.corner_count else "middle of a side"
                 told = (
-                    f"the corner at ({place}) of {_told(first + k, x[k])} is turned inside "
-                    f"out, det F = {least:.3g} there,"
+                    f"the {part} at ({place}) of {cell_in_words(first + k, x[k])} is turned "
+                    f"inside out, det F = {least:.3g} there,"
                 )
         first += len(cells.nodes)
     return told
@@ -61,11 +62,12 @@ def most_strained(mesh: Mesh, u: Array) -> str:
             strain = np.abs(F.swapaxes(1, 2) @ F - np.eye(mesh.dim)).max(axis=(1, 2))
             k = int(strain.argmax())
             if strain[k] > most:
-                most, told = float(strain[k]), _told(first + k, x[k])
+                most, told = float(strain[k]), cell_in_words(first + k, x[k])
         first += len(cells.nodes)
     return told
 
 
-def _told(number: int, corners: Array) -> str:
+def cell_in_words(number: int, corners: Array) -> str:
+    """A cell by its number and the middle of its nodes (a, dim)."""
     centre = ", ".join(f"{c:.4g}" for c in corners.mean(axis=0))
     return f"cell {number} at ({centre})"

@@ -23,7 +23,6 @@ from .state import State, TimeStep, at_rest
 from .system import Motion
 
 WHOLE = 1e-9  # the end may miss a whole number of steps by this part of a step
-LEAST = 1e-9  # seconds for a solve whose deadline has passed: it then says so itself
 
 
 def evolve(
@@ -71,10 +70,9 @@ def evolve(
     state = prepared.begin(state)
 
     def solved(problem: FrictionProblem, first: Iterate, limit: Deadline) -> FrictionSolution:
-        left = max(limit.left, LEAST)
         return drive(
             problem, solver, tolerance=tolerance, contact_tolerance=contact_tolerance,
-            start=first, max_iterations=max_iterations, time_limit=left,
+            start=first, max_iterations=max_iterations, time_limit=limit,
         )  # fmt: skip
 
     def advanced(state: State, time: float, prepared: Any) -> TimeStep:

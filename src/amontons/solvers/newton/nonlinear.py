@@ -176,7 +176,8 @@ class NonlinearNewton:
                     )
                     break
                 except (Breakdown, TimeUp) as ended:
-                    raise self._placed(ended, problem.at_share(share), v, target) from ended
+                    known = problem.at_share(share)
+                    raise self._placed(ended, known, v, target, reason) from ended
                 except (Failed, InvertedCells) as failure:
                     reason, shown.note = str(failure), note
                     if stuck is None and isinstance(failure, _Stuck):
@@ -254,11 +255,15 @@ class NonlinearNewton:
 
     @staticmethod
     def _placed(
-        ended: Breakdown | TimeUp, problem: NonlinearProblem, v: Array, target: Target
-    ) -> Exception:
-        """The same end, with what v has to say where time is over."""
-        remark = "" if target.seconds_left > 0 else problem.remark(v)
-        return Breakdown(f"{ended}; {remark}") if remark else ended
+        ended: Breakdown | TimeUp, problem: NonlinearProblem, v: Array, target: Target,
+        reason: str,
+    ) -> Exception:  # fmt: skip
+        """The same end; where time is over with why load steps ended, and what v has to say."""
+        if target.seconds_left > 0:
+            return ended
+        why = f"load steps ended, as {reason}" if reason else ""
+        told = "; ".join(part for part in (str(ended), why, problem.remark(v)) if part)
+        return Breakdown(told)
 
     @staticmethod
     def _stop(problem: NonlinearProblem, v: Array) -> None:
