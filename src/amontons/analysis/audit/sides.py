@@ -169,7 +169,8 @@ def _side(
     held = forces.is_held.reshape(-1, d)  # by supports or constraints
     force = np.where(held, 0.0, forces.missing.reshape(-1, d))
     nodal, blur = share @ force, share @ np.where(held, 0.0, forces.known.reshape(-1, d))
-    r = np.einsum("pkc,pc->pk", rows.frames, nodal)
+    part = _own_parts(placed, share)[:, None]
+    r = np.einsum("pkc,pc->pk", rows.frames, nodal) / part
     known = np.abs(np.einsum("pkc,pc->pkc", rows.frames, held[node])).max(axis=2) < HELD
     local = (placed.H.T @ moved[0]).reshape(-1, d)
     start = np.zeros(len(node)) if contact.tied else rows.gap
@@ -184,7 +185,7 @@ def _side(
     blurred = (abs(placed.H).T @ (forces.blur + span)).reshape(-1, d).max(axis=1, initial=0.0)
     return Side(
         contact, node, rows.points, rows.weights, rows.sums, np.where(known, r, 0.0), known,
-        np.einsum("pkc,pc->pk", np.abs(rows.frames), blur), start + local[:, 0],
+        np.einsum("pkc,pc->pk", np.abs(rows.frames), blur) / part, start + local[:, 0],
         flat + local[:, 0], local[:, 1:], blurred, start, flat, placed.H,
         law_of([contact], replace(parts, placed=(placed,))), *at_points,
         _around(model, contact, rows.nodes), model.bodies[placed.body].mesh.axisymmetric,
@@ -239,6 +240,20 @@ def _to_corners(
     whole = np.unique(np.stack([to, of]), axis=1, return_index=True)[1]  # middles of two facets
     matrix = sparse.csr_array((value[whole], (to[whole], of[whole])), shape=(total, total))
     return matrix[first + nodes]
+
+
+def _own_parts(placed: Placed, share: sparse.csr_array) -> Array:
+    """How much of what each contact bears acts on its node, (nc,): where others beside it have
+    no contact, not all of it.
+    """
+    nc, d = placed.rows.points.shape
+    columns = (sparse.kron(share, np.eye(d), format="csr") @ placed.H).tocoo()
+    own = columns.row // d == columns.col // d
+    blocks = np.zeros((nc, d, d))
+    row, column = columns.row[own], columns.col[own]
+    blocks[row // d, row % d, column % d] = columns.data[own]
+    size = np.linalg.norm(blocks, 2, axis=(1, 2))  # of a rotation, less what is held
+    return np.where(size > 0, size, 1.0)
 
 
 def _middles(kind: str, nodes: Index) -> list[tuple[Index, Index, Array]]:

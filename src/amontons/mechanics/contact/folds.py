@@ -63,7 +63,9 @@ class Fold:
         for found in _opposite(skin, x, FAR):
             behind = (found.ahead < 0) & (found.back < 0) & (found.aside < 1)
             np.minimum.at(depth, found.one[behind], -found.ahead[behind])
-        held = skin.real & (carrying is not None) & ~np.isin(skin.nodes, carrying)
+        held = np.zeros_like(skin.real)
+        if carrying is not None:
+            held = skin.real & ~np.isin(skin.nodes, carrying)
         none = np.zeros(len(skin.nodes), dtype=np.int64)
         return cls(skin, depth, held.sum(axis=1), none).at(x)
 
