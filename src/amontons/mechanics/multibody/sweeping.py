@@ -1,11 +1,13 @@
-"""What is solved of a step without the solvers: plain sweeps, momentum, relaxations.
+"""What is solved of a step without the solvers: sweeps, interior points on the bodies.
 
 Few contacts are swept until they are solved.  Many are swept with momentum, in chunks, while
-the rate at which the error has fallen in the last chunk promises an end for less than a
-relaxation costs.  Where it does not, as in walls, which have more reactions than balances, the
-convex relaxation with the sliding velocities of the best reactions is solved on the bodies
-(`solvers.newton.body_relaxation`), and a chunk of sweeps goes on from there, which finds the
-sliding that the next relaxation is given.  What that does not solve goes to the solvers.
+the rate at which the error has fallen in the last chunk promises an end for less than an
+interior point costs.  Where it does not, as in walls, which have more reactions than balances,
+the law is solved by an interior point on the bodies (`solvers.newton.body_relaxation`), from
+anew, which mostly takes some ten steps however many reactions there are to choose from.  Where
+that comes to a halt sweeps go on from there, and then convex relaxations with the sliding
+velocities of the best reactions, and sweeps in turn, which find the sliding that the next
+relaxation is given.  What that does not solve goes to the solvers.
 
 Costs are operations counted, so that a step ends alike on all processors.
 """
@@ -39,10 +41,11 @@ STEPS = 60  # of a relaxation at most
 ROUNDS = 30  # relaxations before the solvers are asked
 PATIENCE = 5  # of them without halving the error
 # Nanoseconds, only ratios count: of a plain sweep per block of W; of a sweep with momentum per
-# contact; of a step of a relaxation per contact and per product of blocks; of a relaxation at
-# most, beyond which packings in space fill in.
-BLOCK, SWEEP, STEP, PRODUCT, MOST = 30.0, 120.0, 900.0, 12.0, 4e9
-USUAL = 40  # steps of a relaxation
+# contact; of a step of an interior point per contact and per product of blocks; of one at most,
+# beyond which packings in space fill in.
+BLOCK, SWEEP, STEP, PRODUCT, MOST = 30.0, 120.0, 900.0, 12.0, 1e9
+USUAL = 10  # steps of an interior point that gets there
+FOLLOWED = 0.95  # part of the slope of |u_T| that its steps know
 NO_LEVERS, NO_SIDES = np.zeros((0, 2, 3, 6)), np.zeros((0, 2), np.int64)
 
 
@@ -98,7 +101,7 @@ class Search:
 
     @property
     def relaxation_cost(self) -> float:
-        """Nanoseconds of a usual relaxation."""
+        """Nanoseconds of a usual interior point."""
         return USUAL * (STEP * len(self.posed.q) + PRODUCT * self.matrix.products)
 
     @property
@@ -140,20 +143,26 @@ class Search:
     def swept_while_promising(self, start: Array) -> Found | None:
         """Chunks of sweeps with momentum, one at least."""
         cost, before = SWEEP * len(self.posed.q), math.inf
+        # two of them cost what an interior point costs, if that is not more than can be paid
+        worth = self.relaxation_cost if self.relaxation_cost <= MOST else math.inf
+        chunk = int(min(max(0.5 * worth / cost, FEWEST), CHUNK))
         r = start
         while True:
-            found = self.sweep(r, 0, CHUNK)
+            found = self.sweep(r, 0, chunk)
             if found is not None or not self.goal < self.error < before:
                 return found
             if before < math.inf:
-                needed = CHUNK * math.log(self.error / self.goal)
+                needed = chunk * math.log(self.error / self.goal)
                 needed /= math.log(before / self.error)
                 if cost * needed > self.relaxation_cost:
                     return None
             before, r = self.error, self.r
 
-    def relax(self) -> Array:
-        """Impulses of the relaxation with the sliding of those that were swept last."""
+    def relax(self, part: float = 0.0) -> Array:
+        """Impulses of the relaxation with the sliding of those that were swept last.
+
+        part: of the slope of |u_T|; where it is not 0, those of the law.
+        """
         moved, u = np.empty((len(self.mobility[0]), 6)), np.empty_like(self.latest)
         driven_inplace(self.levers, self.sides, self.latest, moved)
         felt_inplace(self.levers, self.sides, moved, u)
@@ -162,7 +171,7 @@ class Search:
         p = self.posed
         r, steps = relaxed(
             self.levers, self.sides, self.matrix, (p.indptr, p.indices, p.data), p.q,
-            (kind, parameters), rho, np.hypot(u[:, 1], u[:, 2]), self.goal, STEPS,
+            (kind, parameters), rho, np.hypot(u[:, 1], u[:, 2]), part, self.goal, STEPS,
         )  # fmt: skip
         self.relaxing += steps
         return r
@@ -182,13 +191,13 @@ def found_quickly(search: Search) -> tuple[Found | None, Array]:
         return None, search.r
     found = search.swept_while_promising(search.r)
     mark, waited, chunk = search.error, 0, CHUNK
-    for _ in range(ROUNDS):
+    for k in range(ROUNDS):
         if found is not None:
             return found, found.r
         if not search.error > search.goal or search.relaxation_cost > MOST:
             break
         before = search.error
-        found = search.sweep(search.relax(), 0, chunk)
+        found = search.sweep(search.relax(0.0 if k else FOLLOWED), 0, chunk)
         waited += 1
         if not search.error < before:
             chunk = min(2 * chunk, LONGEST)
