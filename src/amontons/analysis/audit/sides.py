@@ -243,8 +243,9 @@ def _to_corners(
 
 
 def _own_parts(placed: Placed, share: sparse.csr_array) -> Array:
-    """How much of what each contact bears acts on its node, (nc,): where others beside it have
-    no contact, not all of it.
+    """How much of what each contact bears acts on its node, (nc,).
+
+    All of it but where nodes beside it have no contact of their own.
     """
     nc, d = placed.rows.points.shape
     columns = (sparse.kron(share, np.eye(d), format="csr") @ placed.H).tocoo()
