@@ -40,6 +40,7 @@ from ...solvers.newton.states import PlainStates
 from ..contact.current import STICK, ContactPoint, Pieces
 from ..contact.current_pairs import Meetings
 from ..elements.linear_body import LinearBody
+from .after_jumps import led_astray
 from .held_parts import HeldParts
 from .moved_pairs import PairLinearisation, balanced, balanced_law
 from .nodal_forces import NodalForces, nodal_forces
@@ -340,6 +341,10 @@ class LargeDeformation(NonlinearProblem):
         first = self.at_share(0.0).contact_point(self.known_state).force if self.known else None
         return places_of_failure(self.parts, u, self.earlier, here.pieces % 4 > 0,
                                  None if first is None else (here.force, first))  # fmt: skip
+
+    def astray(self, v: Array, start: Array) -> str:
+        """Why no jump leads from the state `start` to v, see `after_jumps`; "" for nothing."""
+        return led_astray(self.parts, self.displacement(v), self.displacement(start))
 
     def closed_pieces(self, v: Array) -> list[Pieces]:
         """The active pieces with touching contacts stuck, then with all of them stuck."""
