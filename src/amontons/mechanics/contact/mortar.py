@@ -36,9 +36,9 @@ from scipy import sparse
 from ...core.errors import within
 from ..meshes.cells import CELLS, FIRST
 from ..meshes.check import around
-from ..meshes.facets import Facets, corner_facets, turned
+from ..meshes.facets import corner_facets, turned
 from ..meshes.mesh import Mesh
-from ..meshes.surfaces import nodal_normals, nodal_weights, outward
+from ..meshes.surfaces import nodal_weights
 from .clipping import line_rule, square_rule, triangle_rule
 from .cuts import SIDES
 from .distances import raised
@@ -56,6 +56,7 @@ from .nodal import ContactRows, Field, check_exterior, contact_nodes
 from .overlap import check_different, not_facing
 from .pairs import KINDS, MAX_NODES
 from .segments import Segments, Surface, in_front
+from .slave_normals import slave_normals
 from .turned import Turned, turns
 
 Array = NDArray[np.float64]
@@ -63,7 +64,6 @@ Index = NDArray[np.int64]
 Mask = NDArray[np.bool_]
 EXACT = 1e-9  # the same for the normals of obstacles
 HARDLY = 0.1  # covered part of a node's weight below which it gets no multiplier
-AROUND = 0.7  # cosine between normals below which a facet lies around an edge
 ROUNDING = 1e-14  # averages below this are zeros with rounding errors
 COVERED = 1e-6  # part of a facet that may be missing where it faces the other side as a whole
 RULES = {"line": line_rule(4), "tri": triangle_rule(4), "quad": square_rule(4)}
@@ -130,7 +130,7 @@ def mortar_contact(
     if not len(parts.slave):
         raise not_facing(slave, surface, master, master_surface)
     facets, of = np.unique(parts.slave, return_inverse=True)
-    normals = -_normals(over, facets)
+    normals = -slave_normals(over, facets)
     mass = np.zeros((len(facets), MAX_NODES, MAX_NODES))
     own: Array | None = None
     np.add.at(mass, of, parts.mass)
@@ -282,51 +282,6 @@ def coupled_columns(weights: sparse.csr_array, axes: Array, fixed: Mask) -> spar
 
 
 # -------------------------------------------------------------------- the two sides
-def _normals(slave: Surface, facets: Index) -> Array:
-    """Normals at the nodes, (n, dim), averages without facets around an edge from `facets`.
-
-    Those that face the other side (f,) count, and all that turn from them by less than AROUND.
-    """
-    facing = np.zeros(len(slave.nodes), dtype=bool)
-    facing[facets] = True
-    first = np.zeros(slave.points.shape)
-    share = (slave.area / slave.corners)[facets, None, None] * slave.normal[facets, None]
-    np.add.at(first, slave.nodes[facets], share * slave.real[facets, :, None])
-    length = np.linalg.norm(first, axis=1)
-    along = np.einsum("fac,fc->fa", first[slave.nodes], slave.normal)
-    around = ((along < AROUND * length[slave.nodes]) & slave.real).any(axis=1) & ~facing
-    if slave.curved:
-        return _of_shapes(slave, _curved_normals(slave, ~around), around)
-    blocks = np.split(around, np.cumsum([len(b.nodes) for b in slave.blocks])[:-1])
-    kept = [Facets(b.kind, b.nodes[~out]) for b, out in zip(slave.blocks, blocks, strict=True)]
-    return _of_shapes(slave, nodal_normals(slave.points, tuple(kept)), around)
-
-
-def _of_shapes(slave: Surface, normals: Array, turned: Mask) -> Array:
-    """Normals (n, dim); those of a sphere, cone or cylinder where nothing else is around."""
-    of = slave.shapes.of
-    for number, shape in enumerate(slave.shapes.every):
-        on = np.unique(slave.nodes[(of == number) & ~turned])
-        mine = on[~np.isin(on, slave.nodes[(of != number) & ~turned])]
-        normals[mine] = shape.distance(slave.points[mine])[1]
-    return normals
-
-
-def _curved_normals(slave: Surface, counts: Mask) -> Array:
-    """Unit normals at corners, (n, dim), means of those of the curved facets that count (f,).
-
-    At the corners themselves: averages with shape functions of second order are none.
-    """
-    total = np.zeros(slave.points.shape)
-    for number in np.unique(slave.kind):
-        cell = CELLS[SIDES[number]]
-        nodes = slave.all[(slave.kind == number) & counts, : cell.nodes]
-        for k, at in enumerate(cell.corners[: cell.corner_count]):
-            np.add.at(total, nodes[:, k], outward(cell.jacobians(slave.points[nodes], at)))
-    length = np.linalg.norm(total, axis=1)
-    return total / np.where(length > 0, length, 1.0)[:, None]
-
-
 def _against(slave: Surface, obstacle: Obstacle) -> tuple[Array, Array | None, Array]:
     """int phi phi (f, 4, 4), int phi N (f, 4, w), int g phi (f, 4): whole facets, g the gap.
 

@@ -40,13 +40,15 @@ from ...solvers.newton.states import PlainStates
 from ..contact.current import STICK, ContactPoint, Pieces
 from ..contact.current_pairs import Meetings
 from ..elements.linear_body import LinearBody
+from .after_jumps import led_astray
 from .held_parts import HeldParts
 from .moved_pairs import PairLinearisation, balanced, balanced_law
 from .nodal_forces import NodalForces, nodal_forces
 from .nonlinear_parts import NonlinearParts, nonlinear_parts
-from .obstacle_linearisation import Linearisation, turned_forces
+from .obstacle_linearisation import Linearisation
 from .places_of_failure import places_of_failure
 from .pressure_states import PressureStates
+from .tangent_problem import tangent_problem
 from .tangent_structure import free_modes
 
 if TYPE_CHECKING:
@@ -341,6 +343,10 @@ class LargeDeformation(NonlinearProblem):
         return places_of_failure(self.parts, u, self.earlier, here.pieces % 4 > 0,
                                  None if first is None else (here.force, first))  # fmt: skip
 
+    def astray(self, v: Array, start: Array) -> str:
+        """Why no jump leads from the state `start` to v, see `after_jumps`; "" for nothing."""
+        return led_astray(self.parts, self.displacement(v), self.displacement(start))
+
     def closed_pieces(self, v: Array) -> list[Pieces]:
         """The active pieces with touching contacts stuck, then with all of them stuck."""
         point, size = self.contact_point(v), np.ptp(self.parts.X, axis=0).max()
@@ -357,24 +363,12 @@ class LargeDeformation(NonlinearProblem):
             return self, u, v
 
     def linearised(self, v: Array) -> FrictionProblem:
-        """The tangent problem at v: same reactions, gaps and slips there, frames of there.
-
-        Between bodies that deform frames and averages stay as they are there.
-        """
-        parts, moved = self.parts, self.displacement(v)
-        needed, blocks = self._needed_slopes(moved)
+        """The tangent problem at v: same reactions, gaps and slips there, frames of there."""
+        moved = self.displacement(v)
+        slopes = self._needed_slopes(moved)
         r, u, axes, rest = self._local(v)
-        meeting = parts.meet(moved)
-        if meeting.all_at_obstacles:
-            blocks[parts.diagonal] -= turned_forces(axes, r, meeting.normal_slopes)
-        H = sparse.csc_array(meeting.columns(axes).tocsr()[parts.free])
-        M = parts.on_free(blocks)
-        load, length = self._sizes(v, r, u, rest)
-        w = u - (H.T @ v).reshape(u.shape)
-        return FrictionProblem.from_global(
-            M, H, M @ v - needed[parts.free], w, parts.contact.law_at(meeting), load_scale=load,
-            u_scale=length, name=self.name,
-        )  # fmt: skip
+        sizes = self._sizes(v, r, u, rest)
+        return tangent_problem(self.parts, moved, slopes, (r, u, axes), sizes, self.name)
 
 
 def large_deformation(model: Model) -> LargeDeformation:

@@ -28,10 +28,11 @@ def flattest(mesh: Mesh, u: Array) -> tuple[float, str]:
     return least, told
 
 
-def turned_corner(mesh: Mesh, u: Array) -> str:
+def turned_corner(mesh: Mesh, u: Array, before: Array | None = None) -> str:
     """The node of a cell that is turned inside out the most at u (n, dim), in words.
 
     "" for none.  Integration points may all be in front of it: energies do not feel it.
+    Nodes that were turned at displacements `before` (n, dim) do not count.
     """
     least, told, first = 0.0, "", 0
     for cells in mesh.cells:
@@ -39,6 +40,9 @@ def turned_corner(mesh: Mesh, u: Array) -> str:
         moved = x + u[cells.nodes]
         for c, at in enumerate(cell.corners if cell.kind != "pyramid" else ()):
             ratio = determinant(cell.jacobians(moved, at)) / determinant(cell.jacobians(x, at))
+            if before is not None:
+                then = determinant(cell.jacobians(x + before[cells.nodes], at))
+                ratio = np.where(then * determinant(cell.jacobians(x, at)) < 0, np.inf, ratio)
             k = int(np.where(np.isfinite(ratio), ratio, np.inf).argmin())
             if ratio[k] < least:
                 least, place = float(ratio[k]), ", ".join(f"{c:.4g}" for c in x[k, c])

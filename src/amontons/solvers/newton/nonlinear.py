@@ -83,6 +83,10 @@ class NonlinearProblem(Problem):
         """What may be wrong at a state beyond which no equilibrium is found; "" for nothing."""
         return ""
 
+    def astray(self, v: Array, start: Array) -> str:
+        """Why no jump from a state leads to v though it is an equilibrium; "" for nothing."""
+        return ""
+
     def closed_pieces(self, v: Array) -> list[Any]:
         """Pieces with ever more contacts closed, for states at which nothing holds a body."""
         ...
@@ -148,7 +152,7 @@ class NonlinearNewton:
             loaded = share > 0 or bool(problem.known_state.any())
             if step < self.smallest_share and creeping_helps and loaded:  # with patience, then
                 creeping_helps, share, step, v = False, 0.0, 1.0, problem.known_state
-                shown.note = ""
+                shown.note, shown.wild = "", True
             if step < self.smallest_share:
                 if self.crossing is not None:
                     v, told = self.crossing.across(problem, share, v, target)
@@ -200,10 +204,14 @@ class NonlinearNewton:
         if goal == 1.0:
             states = problem.states(first, known)
             found = self._newton(problem, states, target, linear, shown, creeps)
+            if creeps or shown.wild:
+                found = _not_astray(found, problem, v, target.tolerance)
             yield from shown.best(found)
         then = problem.at_share(goal)
         states = then.states(first, known)
         found = self._newton(then, states, target, linear, shown, creeps)
+        if creeps or shown.wild:
+            found = _not_astray(found, then, v, LOOSE)
         return shown.reached(found, then, states.v(states.start))
 
     def _newton(
@@ -274,6 +282,17 @@ class NonlinearNewton:
         raise Failed(reason)
 
 
+def _not_astray(
+    steps: Iterator[tuple[Array, Array, float]], problem: NonlinearProblem, start: Array,
+    tolerance: float,
+) -> Iterator[tuple[Array, Array, float]]:  # fmt: skip
+    """The steps of a jump from a state; Failed where they end at one that none leads to."""
+    for v, r, size in steps:
+        if problem.error(r, v) <= tolerance and (why := problem.astray(v, start)):
+            raise Failed(why)
+        yield v, r, size
+
+
 class _Stuck(Failed):
     """A Newton step from v (n,) passes the test in no part."""
 
@@ -289,6 +308,7 @@ class _Shown:
     size: float = np.inf
     waiting: int = 0  # Newton steps since then, those that led nowhere, too
     brief: bool = False  # steps that the test refuses end an attempt: another way is next
+    wild: bool = False  # all ways but steps that the test refuses have failed: bodies may jump
     note: str = ""  # what happened on the way
 
     def best(

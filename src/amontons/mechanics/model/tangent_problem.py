@@ -1,0 +1,39 @@
+"""The linear problem with contact that large deformations are at one state.
+
+Forces balance there and its contacts have the reactions, gaps and slips of that state, in the
+frames of there; between bodies that deform frames and averages stay as they are there.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy import sparse
+
+from ...problem.friction import FrictionProblem
+from .nonlinear_parts import NonlinearParts
+from .obstacle_linearisation import turned_forces
+
+Array = NDArray[np.float64]
+
+
+def tangent_problem(
+    parts: NonlinearParts, moved: Array, slopes: tuple[Array, Array],
+    local: tuple[Array, Array, Array], sizes: tuple[float, float], name: str,
+) -> FrictionProblem:  # fmt: skip
+    """At displacements moved (nodes, d).
+
+    slopes: f_int - f (dofs,) and its derivative in node blocks (m, d, d), which are changed;
+    local: r, u (nc, d) and frames (nc, d, d); sizes: of forces and of u.
+    """
+    (needed, blocks), (r, u, axes), (load, length) = slopes, local, sizes
+    v, meeting = moved.ravel()[parts.free], parts.meet(moved)
+    if meeting.all_at_obstacles:
+        blocks[parts.diagonal] -= turned_forces(axes, r, meeting.normal_slopes)
+    H = sparse.csc_array(meeting.columns(axes).tocsr()[parts.free])
+    M = parts.on_free(blocks)
+    w = u - (H.T @ v).reshape(u.shape)
+    return FrictionProblem.from_global(
+        M, H, M @ v - needed[parts.free], w, parts.contact.law_at(meeting), load_scale=load,
+        u_scale=length, name=name,
+    )  # fmt: skip
