@@ -132,19 +132,28 @@ def test_tangents_are_exact_where_supports_hold_springs(law, obstacle):
 
 
 def test_supports_take_what_springs_are_drawn_in_their_direction():
-    """Else law and judge speak of a slip there that no unknown can change."""
-    model = with_held_side({"mu": 0.3, "stick_stiffness": 2.0, "stiffness": 50.0})
+    """The slave stands along x, its master gives way: springs are drawn by what it leaves."""
+    far, k = 0.002, 2.0
+    model = with_held_side({"mu": 0.3, "stick_stiffness": k, "stiffness": 50.0})
     parts = large_deformation(model).parts
     load, prescribed = np.zeros(parts.X.size), model.discretisation.prescribed
-    drawn = np.full((len(parts.at), 2), 0.002)
-    solution = am.solve(large_step(model, load, prescribed, drawn=drawn), tolerance=1e-10)
+    drawn = np.full((len(parts.at), 2), far)
+    problem = large_step(model, load, prescribed, drawn=drawn)
+    solution = am.solve(problem, tolerance=1e-10)
     assert solution.converged
-    axes = large_deformation(model).contact_point(solution.v).meeting.frames
-    slip = np.einsum("pk,pkc->pc", solution.u[:, 1:], axes[:, 1:])
+    axes = problem.contact_point(solution.v).meeting.frames
+    slip, force = (np.einsum("pk,pkc->pc", of[:, 1:], axes[:, 1:])
+                   for of in (solution.u, solution.r))  # fmt: skip
     held = ~parts.contact.free
-    assert held.any()
-    np.testing.assert_allclose(slip[held], 0.0, atol=1e-15)
-    assert (np.linalg.norm(slip, axis=1) > 1e-3).all()  # along the other direction
+    assert held.sum() == 3
+    corners = np.abs(parts.X.reshape(-1, 3)[parts.at[:, 0] // 3][:, 1] - 0.5) > 0.4
+    area = np.where(corners, 1 / 16, 1 / 8)  # of four facets, grown by less than 1e-3
+    np.testing.assert_allclose(force[held], -k * (area * slip[:, 0])[held[:, 0]], rtol=1e-3)
+    assert ((slip[held] > 0.8 * far) & (slip[held] < 0.9 * far)).all()
+    bottom = np.unique(model.bodies[0].mesh.surface("bottom")[0].nodes)
+    below = parts.forces(problem.displacement(solution.v)).reshape(-1, 3)[bottom].sum(axis=0)
+    total = np.einsum("pk,pkc->c", solution.r, axes)
+    np.testing.assert_allclose(below, total, atol=1e-8)
 
 
 def rotated(model, turn):

@@ -22,6 +22,7 @@ from ...mechanics.contact.current import BACK, Pieces
 from ...mechanics.model.large_deformation import LargeDeformation
 from ...mechanics.model.moved_pairs import PairLinearisation
 from ...mechanics.model.obstacle_linearisation import Linearisation
+from ...mechanics.model.rubbed_between import without_rubbed
 from ...problem.law.states import OPEN, SLIP, STICK
 from ...problem.settling import settle
 from ...problem.solution import ContactStatus, FrictionSolution, Outcome
@@ -40,7 +41,7 @@ LETTERS = {2: "f+s-", 3: "fls"}  # of OPEN, SLIP, STICK, BACK as in `pattern`, b
 class LargePath(ABC):
     """A PathProblem in the displacements y (n,) of the free dofs and a parameter p.
 
-    step: the problem at p = 1.
+    step: the problem at p = 1, without friction along what supports hold between two bodies.
     Residuals and margins are forces divided by `unit`, so that rounding is far below one.
     Letters of a pattern: f free, s stick, slip + or - along the tangent in 2D, l in 3D.
     """
@@ -50,6 +51,7 @@ class LargePath(ABC):
 
     def __post_init__(self) -> None:
         self.step.parts.check_tangent()
+        object.__setattr__(self, "step", without_rubbed(self.step))
 
     @abstractmethod
     def at(self, p: float) -> LargeDeformation:

@@ -86,7 +86,7 @@ class PathCrossing:
         load, prescribed, v = step.known  # type: ignore[misc]
         path = LoadPath(step, load, prescribed, drift)
         y, folds, branch = self._reached(path, _start(path, v), deadline)
-        return Arrival(step.reactions(y), y, folds, branch)
+        return Arrival(path.step.reactions(y), y, folds, branch)
 
     def across(
         self, problem: LargeDeformation, share: float, v: Array, target: Target

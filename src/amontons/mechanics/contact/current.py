@@ -20,9 +20,10 @@ much is no slip: z_T (1 - rho a / |z_T|), zero where negative, is in the place o
 (2) is zero where friction opposes what is left of the motion, s_T (1 - a / |s_T|), and none is
 up to there: the proximal map of mu N max(|s_T| - a, 0) in the place of that of mu N |s_T|.
 
-Components that supports prescribe are left out of lambda: between bodies s, with what springs
-were drawn by, counts as zero there, with obstacles the law says lambda, which the support takes
-(`dragged`).  Orthotropic friction, and springs along the surface, are `framed_point`.
+Of components that supports prescribe the law says lambda, which the support takes (`dragged`);
+where both bodies are held in one, as at planes of symmetry, lambda and s, with what springs
+were drawn by, count as zero there.  Orthotropic friction, and springs along the surface, are
+`framed_point`.
 
 [AC] P. Alart, A. Curnier, CMAME 92 (1991).
 [LR] T. Ligurský, Y. Renard, CMAME 280 (2014).
@@ -39,13 +40,23 @@ from numpy.typing import NDArray
 
 from ...problem.law import Law
 from ...problem.law.law import MU, TRESCA
-from ...problem.law.states import OPEN, SLIP, STICK
+from ...problem.law.states import SLIP, STICK
 from .closing import left, slope_of_left
 from .current_pairs import Meetings, ObstaclePair, Pair
-from .dragged import GIVE, dragged, without_held
+from .dragged import GIVE, GIVE_BETWEEN, dragged, softened, without_held
 from .fading import Mixture
-from .pieces import BACK, Pieces, friction_slopes, margins, slides, tangents, turned_slip
+from .pieces import (
+    BACK,
+    Pieces,
+    active,
+    friction_slopes,
+    margins,
+    slides,
+    tangents,
+    turned_slip,
+)
 from .surface_axes import still_drawn
+from .tied_law import gives, tie_inplace
 
 Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]
@@ -56,19 +67,38 @@ Partials = tuple[Array, Array, Array, Array, Array | None]
 class CurrentContact:
     """The law of nc contacts, pair after pair.
 
-    rho (nc,), force per length; free (nc, d), bool: components without a support.
+    rho (nc,), force per length; free (nc, d), bool: components without a support; rubbed
+    (nc, d): held ones between bodies that the law hears, None for none.
     """
 
     pairs: Sequence[Pair]
     law: Law
     rho: Array
     free: Mask
+    rubbed: Mask | None = None
+
+    @cached_property
+    def at_obstacles(self) -> Mask:
+        """Contacts with an obstacle, (nc,)."""
+        known = [np.full(len(p.slaves), isinstance(p, ObstaclePair)) for p in self.pairs]
+        return np.concatenate(known)
 
     @cached_property
     def heard(self) -> Mask:
         """Components of motions that the law hears, (nc, d): with obstacles all of them."""
-        known = [np.full(len(p.slaves), isinstance(p, ObstaclePair)) for p in self.pairs]
-        return self.free | np.concatenate(known)[:, None]
+        out = self.free | self.at_obstacles[:, None]
+        return out if self.rubbed is None else out | self.rubbed
+
+    @cached_property
+    def rho_along(self) -> Array:
+        """rho in z_T, (nc,), see `dragged`."""
+        return softened(self)
+
+    @cached_property
+    def giving(self) -> Array:
+        """GIVE of `dragged`, (nc, 1), of `rho_along`."""
+        give = np.where(self.at_obstacles, GIVE, GIVE_BETWEEN) * self.rho_along / self.rho
+        return give[:, None]
 
     def over(self, meeting: Meetings) -> CurrentContact:
         """The contact whose stresses act on the areas of a meeting, see `grown_areas`."""
@@ -108,7 +138,7 @@ class CurrentContact:
 
     def local(
         self, force: Array, motion: Array, meeting: Meetings, drawn: Array | None = None,
-        play: Array | None = None,
+        play: Array | None = None, given: Array | None = None,
     ) -> tuple[Array, Array, Array]:  # fmt: skip
         """(r, u, frames): reactions and [gap, slip], (nc, d), in the frames (nc, d, d) there.
 
@@ -119,14 +149,16 @@ class CurrentContact:
         own, axes, force = self.over(meeting), meeting.frames, force * self.free
         motion = motion * self.heard
         if (self.heard & ~self.free).any():
-            point = self.at(force, motion, meeting, drawn, play)
-            force, motion = point.force, motion + point.given_way
-        mixed = meeting.mixture(own, force, motion, drawn)
-        r = np.einsum("pkc,pc->pk", axes, force)
-        u = np.einsum("pkc,pc->pk", axes, motion if mixed is None else mixed.motion)
+            point = self.at(force, motion, meeting, drawn, play, given)
+            force, motion, mixed = point.force, point.motion + point.given_way, point.mixed
+        else:
+            mixed = meeting.mixture(own, force, motion, drawn)
+            motion = motion if mixed is None else mixed.motion
+        r, u = (np.einsum("pkc,pc->pk", axes, part) for part in (force, motion))
         if play is not None:
-            z = r[:, 1:] - own.rho[:, None] * u[:, 1:]
-            u[:, 1:] += (1 - left(z, own.rho * play))[:, None] * z / own.rho[:, None]
+            rho = own.rho_along
+            z = r[:, 1:] - rho[:, None] * u[:, 1:]
+            u[:, 1:] += (1 - left(z, rho * play))[:, None] * z / rho[:, None]
         u[:, 0] = meeting.gap if mixed is None else mixed.told_gap
         if drawn is not None:
             part = 1.0 if mixed is None else mixed.weights[:, None]
@@ -135,19 +167,19 @@ class CurrentContact:
 
     def at(
         self, force: Array, motion: Array, meeting: Meetings, drawn: Array | None = None,
-        play: Array | None = None,
+        play: Array | None = None, given: Array | None = None, pieces: Pieces | None = None,
     ) -> ContactPoint:  # fmt: skip
-        """The law at forces lambda and motions s, both (nc, d), where the pairs meet."""
+        """The law at forces lambda and motions s, (nc, d); given and pieces: of `dragged`."""
         own, force, motion = self.over(meeting), force * self.free, motion * self.heard
         mixed = meeting.mixture(own, force, motion, drawn)
         if mixed is not None:
             motion = mixed.motion
         known = own, force, motion, meeting, mixed
         if not self.framed:
-            return dragged(ContactPoint(*known, play))
+            return dragged(ContactPoint(*known, play), given, pieces)
         from .framed_point import FramedPoint  # which is a ContactPoint
 
-        return dragged(FramedPoint(*known, drawn=drawn))
+        return dragged(FramedPoint(*known, drawn=drawn), given, pieces)
 
 
 @dataclass(frozen=True, eq=False)
@@ -155,7 +187,7 @@ class ContactPoint:
     """Where (2) is evaluated; arrays are made when they are asked for.
 
     motion (nc, d): s, or what `mixed` has in its place; play (nc,): a; held (nc, d): H of
-    `dragged`, whose forces are the law's, None for none.
+    `dragged`, whose forces are the law's, None for none, on pieces chosen (nc,) or active ones.
     """
 
     contact: CurrentContact
@@ -165,6 +197,7 @@ class ContactPoint:
     mixed: Mixture | None = None
     play: Array | None = None
     held: Mask | None = None
+    chosen: Pieces | None = None
 
     @property
     def gap(self) -> Array:
@@ -191,21 +224,11 @@ class ContactPoint:
         """Contacts that neither part nor slip, (nc,): their law is rho (s + C lambda)."""
         return self.contact.law.tied
 
-    @cached_property
-    def _gives(self) -> Array:
-        """C of ties in global axes, (nc, d, d)."""
-        (nc, d), give = self.n.shape, self.contact.law.give
-        if give is None:
-            return np.zeros((nc, d, d))
-        across = np.eye(d) - self.n[:, :, None] * self.n[:, None, :]
-        along = self.n[:, :, None] * self.n[:, None, :]
-        return give[:, 0, None, None] * along + give[:, 1, None, None] * across
-
     def _with_ties(self, out: Array) -> Array:
         """The law (nc, d) of the others, with that of ties."""
         if not self.tied.any():
             return out
-        given = self.motion + np.einsum("pij,pj->pi", self._gives, self.force)
+        given = self.motion + np.einsum("pij,pj->pi", gives(self), self.force)
         return np.where(self.tied[:, None], self.contact.rho[:, None] * given, out)
 
     @property
@@ -217,17 +240,17 @@ class ContactPoint:
     def counted(self) -> Array:
         """Parts of lambda in z_T, (nc, d): 1 but for what `dragged` has."""
         held = np.zeros(self.n.shape, dtype=bool) if self.held is None else self.held
-        return np.where(held, 1.0 - GIVE, 1.0)
+        return np.where(held, 1.0 - self.contact.giving, 1.0)
 
     @property
     def given_way(self) -> Array:
         """What is no slip of s, (nc, d): how far springs of `dragged` are drawn."""
-        return (1.0 - self.counted) * self.force / self.contact.rho[:, None]
+        return (1.0 - self.counted) * self.force / self.contact.rho_along[:, None]
 
     @cached_property
     def y(self) -> Array:
         """lambda - rho s, (nc, d)."""
-        return self.counted * self.force - self.contact.rho[:, None] * self.motion
+        return self.counted * self.force - self.contact.rho_along[:, None] * self.motion
 
     @cached_property
     def y_normal(self) -> Array:
@@ -253,7 +276,7 @@ class ContactPoint:
         """z_T, (nc, d), in global axes."""
         if self.play is None:
             return self._z
-        return left(self._z, self.contact.rho * self.play)[:, None] * self._z
+        return left(self._z, self.contact.rho_along * self.play)[:, None] * self._z
 
     @cached_property
     def bound(self) -> Array:
@@ -281,20 +304,10 @@ class ContactPoint:
 
     @cached_property
     def pieces(self) -> Pieces:
-        """Which piece of the law is active, (nc,): OPEN, STICK, SLIP or, in 2D, BACK.
-
-        Contacts without friction slip.  Under a given bound also open contacts stick or slip;
-        they have 4 added.
-        """
-        slide = np.abs(self.along) > self.bound
-        out = np.where(slide, np.where(self.along < 0, BACK, SLIP), STICK)
-        closed = self.z_normal > 0
-        out[self._without] = SLIP
+        """Which piece of the law is active, (nc,), see `pieces`."""
         alone = (self.contact.law.kind == TRESCA) & self.meeting.met
-        out[~closed & ~alone] = OPEN
-        out[~closed & alone] += 4
-        out[self.tied] = STICK
-        return out.astype(np.int8)
+        closed, without = self.z_normal > 0, self._without
+        return active(self.along, self.bound, closed, alone, without, self.tied)
 
     def residual(self, pieces: Pieces | None = None) -> Array:
         """(2), (nc, d), unit of force; or the selection functions of given pieces."""
@@ -347,20 +360,22 @@ class ContactPoint:
         """
         return without_held(self, pieces)
 
-    def of_all(self, pieces: Pieces | None = None) -> Partials:
-        """The same of all components as if none were held.
+    @cached_property
+    def slopes(self) -> Partials:
+        """`of_all` of the pieces of lambda_H in `dragged`."""
+        return self.of_all(self.chosen)
 
-        E, of `surface_axes`, of which this law does not know: None.
-        """
+    def of_all(self, pieces: Pieces | None = None) -> Partials:
+        """The same of all as if none were held; by E of `surface_axes`, unknown here: None."""
         pieces = self.pieces if pieces is None else pieces
         n, d = self.n, self.n.shape[1]
         closed = ((pieces > 0) & (pieces < 4)).astype(float)
-        rho = self.contact.rho[:, None, None]
+        rho = self.contact.rho_along[:, None, None]
         eye = np.eye(d)
         tangential = eye - n[:, :, None] * n[:, None, :]
         in_z, in_bound = self._friction(pieces)
         if self.play is not None:
-            in_z = in_z @ slope_of_left(self._z, self.contact.rho * self.play)
+            in_z = in_z @ slope_of_left(self._z, self.contact.rho_along * self.play)
         law, z = self.contact.law.plain, np.where(closed > 0, self.z_normal, 0.0)[:, None]
         slope = np.where(law.given(z), 0.0, law.parameters[:, MU])
         in_bound = in_bound * (slope * closed)[:, None]
@@ -376,23 +391,8 @@ class ContactPoint:
         by_gap = normal * self.contact.rho[:, None]
         by_motion = rho * (in_z @ tangential)
         if self.tied.any():
-            self._tie_inplace(by_force, by_normal, by_gap, by_motion)
+            tie_inplace(self, by_force, by_normal, by_gap, by_motion)
         return by_force, by_normal, by_gap, by_motion, None
-
-    def _tie_inplace(
-        self, by_force: Array, by_normal: Array, by_gap: Array, by_motion: Array
-    ) -> None:
-        """Put those of ties in their places."""
-        tied, give, d = self.tied, self.contact.law.give, self.n.shape[1]
-        rho, n, force = self.contact.rho[tied], self.n[tied], self.force[tied]
-        by_force[tied] = rho[:, None, None] * self._gives[tied]
-        by_motion[tied] = rho[:, None, None] * np.eye(d)
-        by_gap[tied] = by_normal[tied] = 0.0
-        if give is None:
-            return
-        more = rho * (give[tied, 0] - give[tied, 1])
-        turned = (n * force).sum(axis=1)[:, None, None] * np.eye(d)
-        by_normal[tied] = more[:, None, None] * (turned + n[:, :, None] * force[:, None, :])
 
     def _friction(self, pieces: Pieces) -> tuple[Array, Array]:
         """Derivatives of P by z_T, (nc, d, d), and by the bound, (nc, d)."""

@@ -34,6 +34,7 @@ from numpy.typing import NDArray
 from ...problem.law.law import MU
 from .current import ContactPoint, Partials, Pieces
 from .surface_axes import twist
+from .tied_law import tie_inplace
 
 Array = NDArray[np.float64]
 
@@ -63,7 +64,7 @@ class FramedPoint(ContactPoint):
             T, inverse = law.stretch, np.linalg.inv(law.stretch)
             most = np.linalg.eigvalsh(T)[:, -1]
         give = np.zeros(nc) if law.give is None else law.give[:, 1]
-        rho = (1 / (1 / self.contact.rho + give * most**2))[:, None, None]
+        rho = (1 / (1 / self.contact.rho_along + give * most**2))[:, None, None]
         out = T, inverse - rho * give[:, None, None] * T, -rho * T
         return tuple(map(self._spread, out))  # type: ignore[return-value]
 
@@ -105,19 +106,27 @@ class FramedPoint(ContactPoint):
         normal = closed[:, None] * n + in_bound  # of the force, per z_N
         pressed = self._stiffness_left[:, None, None] * normal[:, :, None]
         in_z = stretch @ in_z
-        squeezed = squeezed * self.counted[:, None, :]
-        by_force = np.eye(n.shape[1]) - pressed * n[:, None, :] - in_z @ squeezed
+        by_counted = -in_z @ squeezed
+        by_force = np.eye(n.shape[1]) - pressed * n[:, None, :]
+        by_force = by_force + by_counted * self.counted[:, None, :]
         by_gap = normal * self.contact.rho[:, None]
         by_motion = -in_z @ moved
         if self.tied.any():
-            self._tie_inplace(by_force, np.zeros_like(by_force), by_gap, by_motion)
-        by_normal, by_axis = self._spun(by_force, by_motion, self.residual(pieces))
+            tie_inplace(self, by_force, np.zeros_like(by_force), by_gap, by_motion)
+        by_spin = by_force @ _cross(self.force) + by_motion @ _cross(self.motion)
+        if self.held is not None:  # parts of lambda that count do not turn
+            turned = self.counted[:, :, None] * _cross(self.force)
+            by_spin += by_counted @ (_cross(self.counted * self.force) - turned)
+        by_normal, by_axis = self._spun(by_spin, by_motion, self.residual(pieces))
         return by_force, by_normal, by_gap, by_motion, by_axis
 
-    def _spun(self, by_force: Array, by_motion: Array, law: Array) -> tuple[Array, Array]:
-        """What (3) has of the spin, by n (nc, d, d) and by E (nc, d, 2 d)."""
+    def _spun(self, by_spin: Array, by_motion: Array, law: Array) -> tuple[Array, Array]:
+        """What (3) has of the spin, by n (nc, d, d) and by E (nc, d, 2 d).
+
+        by_spin: of lambda and s in it.
+        """
         n, d = self.n, self.n.shape[1]
-        by_spin = by_force @ _cross(self.force) + by_motion @ _cross(self.motion) - _cross(law)
+        by_spin = by_spin - _cross(law)
         if self._pulled is not None and not (heard := self.contact.heard).all():
             turned = heard[:, :, None] * _cross(self._pulled)  # what is held does not turn
             by_spin += by_motion @ (_cross(self._pulled * heard) - turned)

@@ -5,9 +5,10 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from ...problem.law.states import SLIP, STICK
+from ...problem.law.states import OPEN, SLIP, STICK
 
 Array = NDArray[np.float64]
+Mask = NDArray[np.bool_]
 Pieces = NDArray[np.int8]
 BACK = 3  # beside the statuses: slip against t, 2D only
 
@@ -49,7 +50,7 @@ def turned_slip(kind: Pieces, n: Array, bound: Array) -> Array:
 
 
 def margins(
-    pieces: Pieces, z_normal: Array, along: Array, bound: Array, without: NDArray[np.bool_]
+    pieces: Pieces, z_normal: Array, along: Array, bound: Array, without: Mask
 ) -> Array:
     """Distances to the borders of given pieces, (nc, 3): all positive inside of them.
 
@@ -67,3 +68,20 @@ def margins(
     ahead[without], behind[without] = np.inf, np.inf
     ahead[other] = -np.inf
     return np.stack([z, ahead, behind], axis=1)
+
+
+def active(
+    along: Array, bound: Array, closed: Mask, alone: Mask, without: Mask, tied: Mask
+) -> Pieces:
+    """Which piece of the law is active, (nc,): OPEN, STICK, SLIP or, in 2D, BACK.
+
+    Contacts without friction slip.  Under a given bound, alone, also open contacts stick or
+    slip; they have 4 added.  All (nc,), along of `ContactPoint`.
+    """
+    slide = np.abs(along) > bound
+    out = np.where(slide, np.where(along < 0, BACK, SLIP), STICK)
+    out[without] = SLIP
+    out[~closed & ~alone] = OPEN
+    out[~closed & alone] += 4
+    out[tied] = STICK
+    return out.astype(np.int8)

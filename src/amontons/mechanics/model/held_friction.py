@@ -1,10 +1,9 @@
 """A doubt about bodies that slide far: supports hold sliding contacts along the surface.
 
-Along components that supports prescribe a contact of two bodies has no friction with finite
-kinematics (`contact.current`): what it would be is part of a reaction that nobody knows, so
-that neither the slave nor its master get it.  Small kinematics has it there, and obstacles
-(`contact.dragged`).  Nothing is missing where the sides do not move on each other, as in planes
-of symmetry.
+What supports take of friction between bodies is there (`contact.dragged`) but along components
+in which the master is held in the same plane, too, and in steps along paths, which leave it out
+(`rubbed_between`).  Nothing is missing where the sides do not move on each other there, as in
+planes of symmetry.
 """
 
 from __future__ import annotations
@@ -18,21 +17,32 @@ from ...core.warned import ResultWarning
 from .fields import ContactFields
 from .laws import rubs
 from .nonlinear_parts import nonlinear_parts
+from .rubbed_between import rubbed_between
 
 if TYPE_CHECKING:
     from .model import Model
 
 Array = NDArray[np.float64]
 MISSING = 0.01  # part of what friction may bear in a pair, missing, that is told
+NONE = 1e-9  # part of it that is rounding of no friction
+SAME_PLANE = (
+    ", where they hold the master in the same plane, too; these have no friction with "
+    "kinematics 'finite'", "hold one elsewhere",
+)  # fmt: skip
+ALONG_PATHS = (
+    "; paths leave out what friction these have",
+    "solve without PathCrossing, hold the body elsewhere, or take the other surface as the "
+    "slave",
+)  # fmt: skip
 
 
 def held_friction(model: Model, fields: ContactFields) -> list[ResultWarning]:
     """Pairs whose friction is notably less for want of that along held components."""
     displacement = np.concatenate(fields.displacement)
     contact = nonlinear_parts(model).contact
-    if contact.heard.all() or not np.isfinite(displacement).all():
+    if contact.free.all() or not np.isfinite(displacement).all():
         return []
-    missing, bound = _missing(model, fields, displacement)
+    missing, bound, why = _missing(model, fields, displacement)
     out, start = [], 0
     for k, pair in enumerate(contact.pairs):
         mine = slice(start, start + len(pair.slaves))
@@ -40,12 +50,15 @@ def held_friction(model: Model, fields: ContactFields) -> list[ResultWarning]:
         most, lost = bound[mine].sum(), missing[mine]
         if lost.sum() > MISSING * most:
             worst = fields.points[mine][int(lost.argmax())]
-            out.append(_warning(model, k, int((lost > 0).sum()), lost.sum() / most, worst))
+            told = int((lost > 0).sum()), lost.sum() / most, worst, why
+            out.append(_warning(model, k, *told))
     return out
 
 
-def _missing(model: Model, fields: ContactFields, displacement: Array) -> tuple[Array, Array]:
-    """(friction missing for supports, the most that friction bears), forces (nc,).
+def _missing(
+    model: Model, fields: ContactFields, displacement: Array
+) -> tuple[Array, Array, tuple[str, str]]:
+    """(friction missing for supports, the most that friction bears, why), forces (nc,).
 
     Of a contact that moves by s along components that are held what is missing is at most the
     force that its body answers s with, rho |s|, as a contact that sticks shows.
@@ -59,17 +72,26 @@ def _missing(model: Model, fields: ContactFields, displacement: Array) -> tuple[
     motion = meeting.relative(displacement)
     normal = fields.frames[:, 0]
     along = motion - (motion * normal).sum(axis=1)[:, None] * normal
-    held = np.linalg.norm(np.where(contact.heard, 0.0, along), axis=1)
-    return np.minimum(bound, contact.rho * held), bound
+    heard, why = contact.heard, SAME_PLANE
+    rubbed = rubbed_between(parts, np.zeros_like(displacement), displacement)
+    if rubbed is not None:
+        force = np.einsum("pk,pkc->pc", r[:, 1:], fields.frames[:, 1:])
+        if (np.abs(force[rubbed]) > NONE * bound.sum()).any():
+            heard = heard | rubbed
+        else:
+            why = ALONG_PATHS
+    held = np.linalg.norm(np.where(heard, 0.0, along), axis=1)
+    return np.minimum(bound, contact.rho * held), bound, why
 
 
-def _warning(model: Model, k: int, count: int, part: float, at: Array) -> ResultWarning:
+def _warning(
+    model: Model, k: int, count: int, part: float, at: Array, why: tuple[str, str]
+) -> ResultWarning:
     contact = model.contacts[k]
     where = ", ".join(f"{c:.6g}" for c in at)
     return ResultWarning(
         "held-without-friction",
         f"contact on {contact.slave!r} with {contact.master!r}: supports hold {count} of its "
-        f"contacts along the surface on which they slide, as at [{where}]; these have no "
-        f"friction with kinematics 'finite', and about {100 * part:.2g} % of what friction "
-        "bears is missing; hold the body elsewhere, or take the other surface as the slave",
+        f"contacts along the surface on which they slide, as at [{where}]{why[0]}, and about "
+        f"{100 * part:.2g} % of what friction bears is missing; {why[1]}",
     )

@@ -11,8 +11,7 @@ which is continuous and piecewise smooth; all its entries are forces.  Friction 
 motion since `before`, the displacements at the end of the last step: [LR] section 3.
 With two bodies that deform (1) has the forces of contacts on other nodes, see `moved_pairs`.
 `linearised`, the tangent problem at a state, is all that statuses, files and pictures need.
-Friction on components that supports hold is that of `contact.dragged` on obstacles; left out
-between bodies.
+Friction on components that supports hold is that of `contact.dragged`.
 
 [LR] T. Ligurský, Y. Renard, "A continuation problem for computing solutions of discretised
 evolution problems with application to plane quasi-static contact problems with friction",
@@ -36,20 +35,22 @@ from ...problem.judge.measures import Measure, Weakest
 from ...problem.law import Law
 from ...problem.protocol import Problem
 from ...solvers.newton.nonlinear import NonlinearProblem
-from ...solvers.newton.states import PlainStates
+from ...solvers.newton.states import PlainStates, States
 from ..contact.current import STICK, ContactPoint, Pieces
 from ..contact.current_pairs import Meetings
 from ..elements.linear_body import LinearBody
 from .after_jumps import led_astray
+from .given_forces import balanced, balanced_law, with_held
 from .held_parts import HeldParts
-from .moved_pairs import PairLinearisation, balanced, balanced_law
+from .moved_pairs import PairLinearisation
 from .nodal_forces import NodalForces, nodal_forces
 from .nonlinear_parts import NonlinearParts, nonlinear_parts
 from .obstacle_linearisation import Linearisation
 from .places_of_failure import places_of_failure
 from .pressure_states import PressureStates
-from .tangent_problem import tangent_problem
-from .tangent_structure import free_modes
+from .rubbed_between import hearing, rubbed_between
+from .rubbed_states import RubbedStates
+from .tangent_problem import tangent_problem, towards
 
 if TYPE_CHECKING:
     from .model import Model
@@ -147,13 +148,15 @@ class LargeDeformation(NonlinearProblem):
         return kept[1].copy()
 
     def _point(
-        self, u: Array, pieces: Pieces | None = None, needed: Array | None = None
-    ) -> tuple[ContactPoint, Array]:
+        self, u: Array, pieces: Pieces | None = None, needed: Array | None = None,
+        held: Array | None = None,
+    ) -> tuple[ContactPoint, Array]:  # fmt: skip
         """The law at displacements u (nodes, d), and f_int - f, balanced.
 
-        By the active or given pieces; needed (dofs,): f_int - f at given pressures.
+        By the active or given pieces; needed (dofs,): f_int - f at given pressures; held
+        (nc, d): forces along held components between bodies, else those of u.
         """
-        known = *self._meeting(u), self.drawn, self.play
+        known = *self._meeting(u), self.drawn, self.play, held
         if needed is not None:
             rest = balanced(self.parts, known[1], needed)
         else:
@@ -172,9 +175,11 @@ class LargeDeformation(NonlinearProblem):
             self.parts.subtract_inplace(blocks, nodes, part)
         return inner - load, blocks
 
-    def contact_point(self, v: Array) -> ContactPoint:
-        """The contact law at a state."""
-        return self._point(self.displacement(v))[0]
+    def contact_point(
+        self, v: Array, held: Array | None = None, pieces: Pieces | None = None
+    ) -> ContactPoint:
+        """The contact law at a state; held and pieces as in `_point`."""
+        return self._point(self.displacement(v), pieces, held=held)[0]
 
     def residual(
         self, v: Array, pieces: Pieces | None = None, pressures: Array | None = None
@@ -194,12 +199,13 @@ class LargeDeformation(NonlinearProblem):
         return self.linearisation(v, pieces).matrix
 
     def linearisation(  # type: ignore[override]  # a cached matrix serves as well
-        self, v: Array, pieces: Pieces | None = None, pressures: Array | None = None
-    ) -> Linearisation | PairLinearisation:
-        """F and its derivatives at a state; pressures as in `residual`."""
+        self, v: Array, pieces: Pieces | None = None, pressures: Array | None = None,
+        held: Array | None = None,
+    ) -> Linearisation | PairLinearisation:  # fmt: skip
+        """F and its derivatives at a state; pressures as in `residual`, held in `_point`."""
         parts, u = self.parts, self.displacement(v)
         needed, blocks = self._needed_slopes(u, pressures)
-        point, rest = self._point(u, pieces, None if pressures is None else needed)
+        point, rest = self._point(u, pieces, None if pressures is None else needed, held)
         if self.law.has_stresses or not point.meeting.only_obstacles:
             return PairLinearisation(parts, u, rest, blocks, point, self.earlier, pieces)
         return Linearisation(parts, u, rest, blocks, point, *point.derivatives(pieces))
@@ -209,27 +215,38 @@ class LargeDeformation(NonlinearProblem):
         return self.contact_point(v).pieces
 
     # ---------------------------------------------------------------- what the driver asks
-    def reactions(self, v: Array) -> Array:
-        """Contact forces r (nc, d) in the frames at the state v."""
-        return self._local(v)[0]
+    def reactions(self, v: Array, held: Array | None = None) -> Array:
+        """Contact forces r (nc, d) in the frames at the state v; held as in `_point`."""
+        return self._local(v, held)[0]
 
-    def _local(self, v: Array) -> tuple[Array, Array, Array, Array]:
+    def _local(self, v: Array, held: Array | None = None) -> tuple[Array, ...]:
         """r, u, frames of `CurrentContact.local`, and f_int - f, balanced (dofs,).
 
         The last state is kept: it is asked for its reactions, then for its error.
         """
-        if not (self._last and np.array_equal(self._last[0], v)):
+        key = np.append(v, [] if held is None else held)
+        if not (self._last and np.array_equal(self._last[0], key)):
             u, contact = self.displacement(v), self.parts.contact
             motion, meeting = self._meeting(u)
             rest = self._balanced(u, meeting)
-            local = contact.local(rest[self.parts.at], motion, meeting, self.drawn, self.play)
-            self._last[:] = v.copy(), *local, rest
-        return tuple(part.copy() for part in self._last[1:])  # type: ignore[return-value]
+            known = motion, meeting, self.drawn, self.play, held
+            if contact.rubbed is not None:
+                rest = with_held(self.parts, self._needed(u), rest, known)
+            local = contact.local(rest[self.parts.at], *known)
+            self._last[:] = key.copy(), *local, rest
+        return tuple(part.copy() for part in self._last[1:])
 
-    def local_velocity(self, v: Array) -> Array:
+    def _held(self, r: Array, v: Array) -> Array | None:
+        """Forces along held components between bodies of reactions r, (nc, d); None: none."""
+        if (rubbed := self.parts.contact.rubbed) is None:
+            return None
+        axes = self.parts.meet(self.displacement(v)).frames
+        return np.where(rubbed, np.einsum("pkc,pk->pc", axes, r), 0.0)
+
+    def local_velocity(self, v: Array, held: Array | None = None) -> Array:
         """u = [gap, slip since the last step], (nc, d), in the frames at the state v."""
         try:
-            return self._local(v)[1]
+            return self._local(v, held)[1]
         except InvertedCells:  # of forces, which only what fades asks for
             s, meeting = self._meeting(self.displacement(v))
             return self.parts.contact.local(0 * s, s, meeting, self.drawn, self.play)[1]
@@ -237,7 +254,7 @@ class LargeDeformation(NonlinearProblem):
     def motion(self, r: Array, v: Array | None = None) -> tuple[Array, Array]:
         """([gap, slip], v) at the state v, without one at 0."""
         v = np.zeros(self.unknowns) if v is None else v
-        return self.local_velocity(v), v
+        return self.local_velocity(v, self._held(r, v)), v
 
     def error(self, r: Array, v: Array | None = None) -> float:
         """The residual measure of `judge` at reactions r and state v; infinite if inverted.
@@ -248,7 +265,7 @@ class LargeDeformation(NonlinearProblem):
         if v is None or not (np.isfinite(v).all() and np.isfinite(r).all()):
             return np.inf
         try:
-            _, u, axes, rest = self._local(v)
+            _, u, axes, rest = self._local(v, self._held(r, v))
         except InvertedCells:
             return np.inf
         load, length = self._sizes(v, r, u, rest)
@@ -273,7 +290,7 @@ class LargeDeformation(NonlinearProblem):
         if v is None or not (np.isfinite(v).all() and np.isfinite(r).all()):
             return Weakest(np.inf, None)
         try:
-            u = self._local(v)[1]
+            u = self._local(v, self._held(r, v))[1]
         except InvertedCells:
             return Weakest(np.inf, None)
         moved, contact = self.displacement(v), self.parts.contact
@@ -294,13 +311,16 @@ class LargeDeformation(NonlinearProblem):
 
     @property
     def meets_first(self) -> bool:
-        """True where some body keeps small strains: its cells may be inverted."""
-        return any(isinstance(body, LinearBody) for body in self.parts.bodies)
+        """True where cells may be inverted by small strains, or see `RubbedStates`."""
+        rubbed = self.parts.contact.rubbed is not None
+        return rubbed or any(isinstance(body, LinearBody) for body in self.parts.bodies)
 
-    def states(self, v: Array, known: Any = None) -> PlainStates | PressureStates:
-        """What Newton's method moves: v alone, or with the pressures of hybrid cells."""
-        keeps_volume = any(self.parts.keeps_volume)
-        return PressureStates(self, v, known) if keeps_volume else PlainStates(self, v)
+    def states(self, v: Array, known: Any = None) -> States:
+        """What Newton's method moves: v, with hybrid pressures, with forces of supports."""
+        if self.parts.contact.rubbed is not None:
+            return RubbedStates(self, v, known)
+        volumes = any(self.parts.keeps_volume)
+        return PressureStates(self, v, known) if volumes else PlainStates(self, v)
 
     def held(self, v: Array, firmness: float) -> LargeDeformation:
         """The problem with springs of `held_parts`, relaxed at a state."""
@@ -325,16 +345,7 @@ class LargeDeformation(NonlinearProblem):
 
     def towards(self, share: float, goal: float, v: Array) -> FrictionProblem:
         """The tangent problem at a share and state v, under the load of another share."""
-        now, then = self.at_share(share), self.at_share(goal)
-        tangent, u = now.linearised(v), now.displacement(v)
-        moved = then.prescribed - now.prescribed
-        force = (then.load - now.load).at(u)
-        force -= self.parts.matrix(now._needed_slopes(u)[1]) @ moved
-        meeting, w = self.parts.meet(u), np.array(tangent.w)
-        w[:, 0] += (meeting.normals * meeting.relative(moved.reshape(u.shape))).sum(axis=1)
-        force, modes = force[self.parts.free], free_modes(self.parts, u)
-        return replace(tangent, f=tangent.f + force, w=w, near_nullspace=modes, guess=v,
-                       load_scale=max(tangent.load, float(np.linalg.norm(force))))  # fmt: skip
+        return towards(self.at_share(share), self.at_share(goal), v)
 
     def remark(self, v: Array) -> str:
         """Which slaves face nothing of their masters, leave or hang on edges; what is flat."""
@@ -358,15 +369,15 @@ class LargeDeformation(NonlinearProblem):
         """A solution is one of the tangent problem at its state unless cells are inverted."""
         u, v = self.motion(r, v)
         try:
-            return self.linearised(v), u, v
+            return self.linearised(v, self._held(r, v)), u, v
         except InvertedCells:
             return self, u, v
 
-    def linearised(self, v: Array) -> FrictionProblem:
-        """The tangent problem at v: same reactions, gaps and slips there, frames of there."""
+    def linearised(self, v: Array, held: Array | None = None) -> FrictionProblem:
+        """At v: same reactions, gaps and slips there; frames and averages stay as there."""
         moved = self.displacement(v)
         slopes = self._needed_slopes(moved)
-        r, u, axes, rest = self._local(v)
+        r, u, axes, rest = self._local(v, held)
         sizes = self._sizes(v, r, u, rest)
         return tangent_problem(self.parts, moved, slopes, (r, u, axes), sizes, self.name)
 
@@ -394,5 +405,6 @@ def large_step(
         before = np.zeros(parts.X.size)
     elif parts.folds:
         parts = nonlinear_parts(model.divided(before))
+    parts = hearing(parts, rubbed_between(parts, before, prescribed))
     return LargeDeformation(parts, NodalForces.of(load), prescribed, before,
                             np.zeros(parts.at.shape), known, model.name, drawn)  # fmt: skip

@@ -55,77 +55,13 @@ from ..contact.current import ContactPoint, Partials, Pieces
 from ..contact.current_mortar import MortarMeeting
 from ..contact.current_pairs import AnyMeeting, Meeting, Meetings
 from ..contact.current_slopes import blocks_of
+from ..contact.dragged import asked, between_bodies, missed, of_held
+from .given_forces import carried, given_to_others, kept_back, others, unchained
 from .nodal_forces import NodalForces
 from .nonlinear_parts import NonlinearParts
 from .tangent_structure import structure_of
 
 Array = NDArray[np.float64]
-
-
-def balanced(
-    parts: NonlinearParts, meeting: Meetings, needed: Array, less: Array | None = None
-) -> Array:
-    """f_int - f (dofs,) without the forces that contacts give to nodes other than the slave.
-
-    At slaves it is C times that.  less (nc, d): what (3) takes off lambda.
-    """
-    if meeting.only_obstacles:
-        return needed
-    own = parts.gathers @ needed
-    if parts.chained:
-        others = _others(parts, meeting)
-        if less is not None:
-            own = own + parts.gathers @ (others @ less.ravel())
-        own = _unchained(parts, others, own)
-    own = own.reshape(parts.at.shape) * _carried(parts, meeting)
-    out = needed - meeting.given(own if less is None else own - less)
-    out[parts.at] = (parts.gathers @ out).reshape(parts.at.shape)
-    return out
-
-
-def _carried(parts: NonlinearParts, meeting: Meetings) -> Array:
-    """1 for components of forces that contacts take, (nc, d), 0 for the others."""
-    return (parts.contact.free & meeting.met[:, None]).astype(np.float64)
-
-
-def balanced_law(
-    parts: NonlinearParts, needed: Array, rest: Array,
-    known: tuple[Array, Meetings, Array | None, Array | None], pieces: Pieces | None = None,
-) -> tuple[ContactPoint, Array]:  # fmt: skip
-    """The law, and `balanced`, with (3) by the active or given pieces.
-
-    rest: `balanced` without (3); known: s, where contacts meet, drawn and play of
-    `CurrentContact.at`.
-    """
-    point = parts.contact.at(rest[parts.at], *known)
-    if point.mixed is None:
-        return point, rest
-    for _ in range(parts.chained + 1):  # forces on the next pair of a chain follow
-        rest = balanced(parts, known[1], needed, kept_back(point, pieces))
-        point = parts.contact.at(rest[parts.at], *known)
-    return point, rest
-
-
-def kept_back(point: ContactPoint, pieces: Pieces | None = None) -> Array | None:
-    """(1 - theta) law of (3), (nc, d), of active or given pieces; None where nothing fades."""
-    if point.mixed is None:
-        return None
-    faint = 1 - point.mixed.theta
-    return faint[:, None] * point.residual(pieces) * point.contact.free
-
-
-def _unchained(parts: NonlinearParts, others: sparse.csr_array, gathered: Any) -> Any:
-    """(I + C O)^-1 of (2) times an array or matrix (nc d, ...), others (dofs, nc d): O."""
-    out = term = gathered
-    for _ in range(parts.chained):
-        term = -(parts.gathers @ (others @ term))
-        out = out + term
-    return out
-
-
-def _others(parts: NonlinearParts, meeting: Meetings) -> sparse.csr_array:
-    """Forces on other nodes per force on the slaves, (dofs, nc d)."""
-    return meeting.returned(_carried(parts, meeting))
 
 
 @dataclass(frozen=True, eq=False)
@@ -146,10 +82,13 @@ class PairLinearisation:
 
     @cached_property
     def residual(self) -> Array:
-        """F, (n,)."""
+        """F, (n,), with what forces along held components miss made good to first order."""
         out = self.rest.copy()
         out[self.parts.at] = self.point.residual()
-        return out[self.parts.free]
+        out = out[self.parts.free]
+        if between_bodies(self.point) is None:
+            return out
+        return out + self._by_held(missed(self.point))
 
     @cached_property
     def _chained(self) -> tuple[Partials, Array, Array]:
@@ -175,7 +114,7 @@ class PairLinearisation:
     @cached_property
     def _others(self) -> sparse.csr_array:
         """Forces on other nodes per force on the slaves, (dofs, nc d)."""
-        return _others(self.parts, self.point.meeting)
+        return others(self.parts, self.point.meeting)
 
     @cached_property
     def _faint(self) -> Array:
@@ -184,9 +123,28 @@ class PairLinearisation:
         return np.ravel((1 - self.point.mixed.theta)[:, None] * self.parts.contact.free)
 
     @cached_property
+    def _held(self) -> tuple[Array, tuple[Partials, Array, Array]] | None:
+        """Forces along held components, (nc, d), and what `_chained` has of the law."""
+        held, mixed = of_held(self.point), self.point.mixed
+        if held is None:
+            return None
+        force, partials = held
+        if mixed is not None:
+            return force, mixed.chained(partials)
+        return force, (partials, np.zeros(0), np.zeros(0))
+
+    @cached_property
+    def _given(self) -> sparse.csr_array:
+        """Forces on other nodes per force on the slaves, held components too, (dofs, nc d)."""
+        return given_to_others(self.parts, self.point.meeting)
+
+    @cached_property
     def _by_force(self) -> sparse.csr_array:
         """Derivative of the law by lambda, (nc d, nc d)."""
-        partials, by_share, _ = self._chained
+        return self._of_force(self._chained)
+
+    def _of_force(self, chained: tuple[Partials, Array, Array]) -> sparse.csr_array:
+        partials, by_share, _ = chained
         by_force = blocks_of(partials[0])
         if self.point.mixed is not None:
             free = self.parts.contact.free.astype(float)
@@ -203,16 +161,19 @@ class PairLinearisation:
     @cached_property
     def _returned(self) -> sparse.csr_array:
         """Derivative of the forces on other nodes by lambda, (dofs, nc d): O with (3)."""
-        if self.point.mixed is None:
-            return self._others
-        less = sparse.diags_array(self._faint) @ self._by_force
-        return sparse.csr_array(self._others - self._others @ less)
+        out = self._others
+        if self.point.mixed is not None:
+            less = sparse.diags_array(self._faint) @ self._by_force
+            out = sparse.csr_array(out - out @ less)
+        if self._held is not None:
+            out = sparse.csr_array(out + self._given @ self._of_force(self._held[1]))
+        return out
 
     def _left(self, needed: Any) -> Any:
         """What (1) leaves of f_int - f on all nodes, of an array or matrix (dofs, ...)."""
         own = self.parts.gathers @ needed
         if self.parts.chained:
-            own = _unchained(self.parts, self._returned, own)
+            own = unchained(self.parts, self._returned, own)
         return own
 
     def passed(self, change: Array) -> Array:
@@ -229,10 +190,22 @@ class PairLinearisation:
             return out
         return out + self.passed(self._others @ (self._faint * change.ravel()))
 
+    def with_held(self, law: Array) -> Array:
+        """First-order change of F, (n,), with what is asked of held components.
+
+        By the law at contacts, (nc, d), of another state.
+        """
+        return self._by_held(asked(self.point, law))
+
+    def _by_held(self, change: Array) -> Array:
+        """First-order change of F, (n,), with one of forces along held components, (nc, d)."""
+        by_force = np.einsum("pij,pj->pi", self.point.slopes[0], change)
+        return self.with_law(by_force) - self.passed(self._given @ change.ravel())
+
     @cached_property
     def _force(self) -> Array:
         """lambda of nodes that meet, (nc, d)."""
-        return self.rest[self.parts.at] * _carried(self.parts, self.point.meeting)
+        return self.rest[self.parts.at] * carried(self.parts, self.point.meeting)
 
     @property
     def _each(self) -> Iterator[tuple[AnyMeeting, AnyMeeting, slice]]:
@@ -243,13 +216,14 @@ class PairLinearisation:
             start = mine.stop
             yield part, old, mine
 
-    @property
-    def _by_growth(self) -> Array | None:
-        """(2) of `contact.grown_areas`, (nc, d, 1); None where areas tell nothing."""
-        point, (partials, by_share, _) = self.point, self._chained
+    def _by_growth(
+        self, value: Array, chained: tuple[Partials, Array, Array]
+    ) -> Array | None:
+        """(2) of `contact.grown_areas` of a value (nc, d), (nc, d, 1); None for no stress."""
+        point, (partials, by_share, _) = self.point, chained
         if not point.contact.law.has_stresses:
             return None
-        left = point.residual(self.given) - np.einsum("pij,pj->pi", partials[0], point.force)
+        left = value - np.einsum("pij,pj->pi", partials[0], point.force)
         if point.mixed is not None:
             left -= np.einsum("pij,pj->pi", by_share, point.mixed.passed)
         return (left / point.meeting.growth[:, None])[:, :, None]
@@ -257,9 +231,14 @@ class PairLinearisation:
     @cached_property
     def _by_place(self) -> sparse.csr_array:
         """Derivative of the law by the place of all nodes, lambda held, (nc d, dofs)."""
+        return self._of_place(self.point.residual(self.given), self._chained)
+
+    def _of_place(
+        self, value: Array, chained: tuple[Partials, Array, Array]
+    ) -> sparse.csr_array:
         parts, meeting, rows = self.parts, self.point.meeting, []
-        (_, by_normal, by_gap, by_motion, by_axis), by_share, by_weight = self._chained
-        by_growth = self._by_growth
+        (_, by_normal, by_gap, by_motion, by_axis), by_share, by_weight = chained
+        by_growth = self._by_growth(value, chained)
         for part, old, mine in self._each:
             slopes = by_normal[mine], by_gap[mine], by_motion[mine]
             if isinstance(part, MortarMeeting) and isinstance(old, MortarMeeting):
@@ -291,7 +270,9 @@ class PairLinearisation:
         for part, _, mine in self._each:
             if isinstance(part, MortarMeeting):
                 yield part.slopes.products((-force if less is None else less - force)[mine])
-        if less is None:
+        if self._held is not None:
+            yield [(self._given, sparse.csr_array(-self._of_place(*self._held)))]
+        if self.point.mixed is None:
             return
         law, rows = self.point.residual(self.given) * self.parts.contact.free, []
         for part, _, mine in self._each:
@@ -309,7 +290,7 @@ class PairLinearisation:
         parts, shape = self.parts, (len(self.rest), len(self.rest))
         own = needed = parts.gathered(self.blocks)
         if parts.chained:
-            needed = sparse.csr_array(_unchained(parts, self._returned, own.matrix))
+            needed = sparse.csr_array(unchained(parts, self._returned, own.matrix))
         taken: list[Product] = [(self._returned, -needed)]
         for turned in self._turned:
             taken += turned
@@ -322,6 +303,21 @@ class PairLinearisation:
         products = [(None, change.times(self._kept)), (by_force, own), (self._law, change),
                     (None, by_place)]  # fmt: skip
         return rows_of_products(products, shape)
+
+    def followed(self, moved: Array, more: Array | float = 0.0) -> Array:
+        """How forces along held components go with displacements (dofs,), (nc, d).
+
+        To first order; what their law misses here is made good.  more (dofs,): change of
+        f_int - f beside that.
+        """
+        assert self._held is not None
+        change = self.parts.matrix(self.blocks) @ moved + more
+        if self.parts.chained:
+            for turned in self._turned:
+                change += sum_of_products(turned, (len(moved), len(moved))) @ moved
+        out = self._of_force(self._held[1]) @ self._left(change)
+        out += self._of_place(*self._held) @ moved
+        return out.reshape(self.parts.at.shape) + missed(self.point)
 
     @cached_property
     def matrix(self) -> sparse.csc_array:
@@ -340,6 +336,9 @@ class PairLinearisation:
         out = change[self.parts.free] - self.passed(NodalForces.of(load).at(self.u))
         if drift is not None:
             out += self.with_law(np.einsum("pij,pj->pi", self._chained[0][3], drift))
+            if self._held is not None:
+                more = np.einsum("pij,pj->pi", self._held[1][0][3], drift)
+                out -= self.passed(self._given @ more.ravel())
         return out
 
 

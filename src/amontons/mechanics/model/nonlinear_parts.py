@@ -7,7 +7,7 @@ columns always have the same pattern, so that they are one `take` away.
 from __future__ import annotations
 
 from collections import deque
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import TYPE_CHECKING, Any
@@ -26,7 +26,7 @@ from ..elements.hyperelasticity import HyperelasticBody, is_hyperelastic
 from ..elements.linear_body import LinearBody
 from .finite_checks import chains, check_nodes, check_supported
 from .met_pairs import cleared, free_dofs, met_pairs, resistance
-from .tangent_structure import Numbering
+from .tangent_structure import Numbering, pattern_of
 from .worst_cells import flattest, most_strained
 
 if TYPE_CHECKING:
@@ -138,6 +138,11 @@ class NonlinearParts:
     @cached_property
     def _divisions(self) -> deque[tuple[Array, NonlinearParts]]:
         """States, and these parts with the sides of folds there."""
+        return deque(maxlen=KEPT)
+
+    @cached_property
+    def variants(self) -> deque[tuple[NDArray[np.bool_] | None, NonlinearParts]]:
+        """The same with other components held that the law hears, see `rubbed_between`."""
         return deque(maxlen=KEPT)
 
     def growth(self, u: Array) -> Array | float:
@@ -353,7 +358,7 @@ def _nonlinear_parts(model: Model) -> NonlinearParts:
     check_nodes(pairs, nodes, free_dofs(linear).reshape(-1, d))
     at = nodes[:, None] * d + np.arange(d)
     is_free = free_dofs(linear)
-    rows, columns = _pattern(bodies)
+    rows, columns = pattern_of(bodies)
     contact_of = np.full(len(X), -1)
     contact_of[nodes] = np.arange(len(nodes))
     numbers = np.arange(len(rows) * d * d, dtype=np.int64).reshape(-1, d, d)
@@ -377,17 +382,6 @@ def _kind_of(body: Body) -> type[HyperelasticBody | LinearBody]:
     if body.corotational:
         return CorotationalBody
     return HyperelasticBody if is_hyperelastic(body.material) else LinearBody
-
-
-def _pattern(bodies: Sequence[HyperelasticBody | LinearBody]) -> tuple[Index, Index]:
-    """Rows and columns (nodes) of all blocks."""
-    rows, columns, start = [], [], 0
-    for body in bodies:
-        count = len(body.mesh.points)
-        rows.append(np.repeat(np.arange(count), np.diff(body.pointers)) + start)
-        columns.append(body.columns.astype(np.int64) + start)
-        start += count
-    return np.concatenate(rows), np.concatenate(columns)
 
 
 def _matrix(blocks: NDArray, columns: Index, pointers: Index) -> sparse.bsr_array:

@@ -71,6 +71,14 @@ class PressureStates:
         balance = self.problem.residual(v, pressures=c)
         return np.concatenate([balance, parts.pressure_forces * (c - right)])
 
+    def reactions(self, w: Array) -> Array:
+        """Contact forces, (nc, d)."""
+        return self.problem.reactions(self.v(w))
+
+    def missing(self, w: Array) -> Array:
+        """F (n,) with the pressures of v."""
+        return self.problem.residual(self.v(w))
+
     def linearisation(self, w: Array) -> Reduced:
         """What is left of the tangent at a state when the pressures are eliminated."""
         v, c = w[: self._size], w[self._size :]

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
@@ -13,6 +14,8 @@ from scipy.sparse import csgraph
 from ...linear.condensed import Structure
 
 if TYPE_CHECKING:
+    from ..elements.hyperelasticity import HyperelasticBody
+    from ..elements.linear_body import LinearBody
     from .nonlinear_parts import NonlinearParts
 
 Array = NDArray[np.float64]
@@ -73,3 +76,14 @@ def rigid_modes(x: Array, part: Index) -> Array:
     for k, (i, j) in enumerate(planes, d):
         out[:, i, k], out[:, j, k] = -y[:, j], y[:, i]
     return out.reshape(n * d, -1)
+
+
+def pattern_of(bodies: Sequence[HyperelasticBody | LinearBody]) -> tuple[Index, Index]:
+    """Rows and columns (nodes) of all blocks."""
+    rows, columns, start = [], [], 0
+    for body in bodies:
+        count = len(body.mesh.points)
+        rows.append(np.repeat(np.arange(count), np.diff(body.pointers)) + start)
+        columns.append(body.columns.astype(np.int64) + start)
+        start += count
+    return np.concatenate(rows), np.concatenate(columns)

@@ -26,6 +26,7 @@ from ..model.large_deformation import LargeDeformation, large_step
 from ..model.nodal_forces import NodalForces
 from ..model.nonlinear_parts import nonlinear_parts
 from ..model.reactions import support_forces
+from ..model.rubbed_between import without_rubbed
 from .energy import Energies, Forces, path_work, slow_energies
 from .moreau_jean import Solve
 from .passage import Crossing, taken
@@ -71,6 +72,8 @@ class LargeSlowModel:
         state = self._on_areas(body, state)
         drawn = self._drawn(body, state)
         problem = large_step(body, load, prescribed, q0, self._known(state), drawn)
+        if self.crossing is not None:  # as its path has it
+            problem = without_rubbed(problem)
         force = np.einsum("pk,pkc->pc", state.force, problem.earlier.frames)
         problem = replace(problem, drift=problem.drift + before(problem.parts.contact, force))
         if self.crossing is None:  # a kink beyond those that paths know

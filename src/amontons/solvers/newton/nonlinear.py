@@ -253,7 +253,7 @@ class NonlinearNewton:
             if not goes and shown.brief and not self._right(problem, v, target):
                 raise _Stuck(v)
             w = w + length * step
-            yield states.v(w), problem.reactions(states.v(w)), size
+            yield states.v(w), states.reactions(w), size
         raise Breakdown("out of time between two load steps")
 
     @staticmethod

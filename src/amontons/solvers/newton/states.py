@@ -41,6 +41,14 @@ class States(Protocol):
         """What has to become zero, unit of force; raises InvertedCells."""
         ...
 
+    def reactions(self, w: Array) -> Array:
+        """Contact forces, (nc, d)."""
+        ...
+
+    def missing(self, w: Array) -> Array:
+        """F (n,) of what steps of v are judged by."""
+        ...
+
     def linearisation(self, w: Array) -> Linear:
         """The linear problem of a step of v."""
         ...
@@ -67,6 +75,12 @@ class PlainStates:
     def residual(self, w: Array) -> Array:
         """F (n,)."""
         return self._problem.residual(w)
+
+    missing = residual
+
+    def reactions(self, w: Array) -> Array:
+        """Contact forces, (nc, d)."""
+        return self._problem.reactions(w)
 
     def linearisation(self, w: Array) -> Linear:
         """F and its derivatives."""

@@ -71,7 +71,7 @@ def by_natural_test(
         if length < problem.shortest and np.isfinite(best):
             break
         try:
-            F = problem.residual(states.v(w + length * step))
+            F = states.missing(w + length * step)
         except InvertedCells as why:
             reason = str(why)
             continue
