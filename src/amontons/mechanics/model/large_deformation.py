@@ -50,7 +50,7 @@ from .places_of_failure import places_of_failure
 from .pressure_states import PressureStates
 from .rubbed_between import hearing, rubbed_between
 from .rubbed_states import RubbedStates
-from .tangent_problem import tangent_problem, towards
+from .tangent_problem import moved_on, tangent_problem
 
 if TYPE_CHECKING:
     from .model import Model
@@ -345,7 +345,12 @@ class LargeDeformation(NonlinearProblem):
 
     def towards(self, share: float, goal: float, v: Array) -> FrictionProblem:
         """The tangent problem at a share and state v, under the load of another share."""
-        return towards(self.at_share(share), self.at_share(goal), v)
+        now, then = self.at_share(share), self.at_share(goal)
+        u, moved = now.displacement(v), then.prescribed - now.prescribed
+        needed, blocks = now._needed_slopes(u)
+        force = (then.load - now.load).at(u) - self.parts.matrix(blocks) @ moved
+        tangent = now._tangent_problem(v, (needed, blocks))
+        return moved_on(tangent, self.parts, v, u, moved, force)
 
     def remark(self, v: Array) -> str:
         """Which slaves face nothing of their masters, leave or hang on edges; what is flat."""
@@ -375,11 +380,15 @@ class LargeDeformation(NonlinearProblem):
 
     def linearised(self, v: Array, held: Array | None = None) -> FrictionProblem:
         """At v: same reactions, gaps and slips there; frames and averages stay as there."""
-        moved = self.displacement(v)
-        slopes = self._needed_slopes(moved)
+        return self._tangent_problem(v, self._needed_slopes(self.displacement(v)), held)
+
+    def _tangent_problem(
+        self, v: Array, slopes: tuple[Array, Array], held: Array | None = None
+    ) -> FrictionProblem:
+        """The same; slopes: `_needed_slopes`, which are changed."""
         r, u, axes, rest = self._local(v, held)
-        sizes = self._sizes(v, r, u, rest)
-        return tangent_problem(self.parts, moved, slopes, (r, u, axes), sizes, self.name)
+        local, sizes, moved = (r, u, axes), self._sizes(v, r, u, rest), self.displacement(v)
+        return tangent_problem(self.parts, moved, slopes, local, sizes, self.name)
 
 
 def large_deformation(model: Model) -> LargeDeformation:

@@ -7,7 +7,6 @@ frames of there; between bodies that deform frames and averages stay as they are
 from __future__ import annotations
 
 from dataclasses import replace
-from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
@@ -17,9 +16,6 @@ from ...problem.friction import FrictionProblem
 from .nonlinear_parts import NonlinearParts
 from .obstacle_linearisation import turned_forces
 from .tangent_structure import free_modes
-
-if TYPE_CHECKING:
-    from .large_deformation import LargeDeformation
 
 Array = NDArray[np.float64]
 
@@ -46,17 +42,19 @@ def tangent_problem(
     )  # fmt: skip
 
 
-def towards(now: LargeDeformation, then: LargeDeformation, v: Array) -> FrictionProblem:
-    """At a state v of a load, under another load."""
-    tangent, u = now.linearised(v), now.displacement(v)
-    moved = then.prescribed - now.prescribed
-    force = (then.load - now.load).at(u)
-    force -= now.parts.matrix(now._needed_slopes(u)[1]) @ moved
-    meeting, w = now.parts.meet(u), np.array(tangent.w)
-    motion, contact = meeting.relative(moved.reshape(u.shape)), now.parts.contact
+def moved_on(
+    tangent: FrictionProblem, parts: NonlinearParts, v: Array, u: Array,
+    moved: Array, force: Array,
+) -> FrictionProblem:  # fmt: skip
+    """That of a state v under another load, for which supports move by `moved` (dofs,).
+
+    u (nodes, d): displacements at v; force (dofs,): what comes to the free dofs by both.
+    """
+    meeting, w, contact = parts.meet(u), np.array(tangent.w), parts.contact
+    motion = meeting.relative(moved.reshape(u.shape))
     w[:, 0] += (meeting.normals * motion).sum(axis=1)
     if (held := contact.heard & ~contact.free).any():
         w[:, 1:] += np.einsum("pkc,pc->pk", meeting.frames[:, 1:], motion * held)
-    force, modes = force[now.parts.free], free_modes(now.parts, u)
+    force, modes = force[parts.free], free_modes(parts, u)
     return replace(tangent, f=tangent.f + force, w=w, near_nullspace=modes, guess=v,
                    load_scale=max(tangent.load, float(np.linalg.norm(force))))  # fmt: skip
