@@ -2,10 +2,11 @@
 
 A pair has slave nodes p and a master surface.  All is taken at the positions x of all nodes:
 n_p is the unit normal at p, out of the master into the slave, that of `faced_normals`: the
-area average of the facets around it where they face the master; of a node that faces nobody,
-in dynamics, of ties and under a given bound (Tresca's law) that of whole facets.  On every
-slave facet psi are the dual functions of `dual` on that part of it that faces the master
-([PSG]), D_p = int psi_p over all facets, and
+area average of the facets around it where they face the master, at a ridge nearer to that of a
+straight master (`agreed_normals`); of a node that faces nobody, in dynamics, of ties and under
+a given bound (Tresca's law) that of whole facets.  On every slave facet psi are the dual
+functions of `dual` on that part of it that faces the master ([PSG]), D_p = int psi_p over all
+facets, and
 
     B_pp = 1,   B_pq = - int psi_p N_q / D_p  of master nodes q,   sum_j B_pj = 0,         (1)
     G_p = sum_j B_pj x_j / pi_p,      g_p = n_p . G_p,                                      (2)
@@ -63,9 +64,9 @@ from numpy.typing import NDArray
 from scipy import sparse
 
 from ...linear.sums import sum_of_blocks, sum_of_products
+from .agreed_normals import AgreedNormals
 from .couples import Couples
 from .current_slopes import MortarSlopes
-from .faced_normals import FacedNormals
 from .facing import Skin, shapes
 from .fading import Fading
 from .folds import Fold
@@ -90,6 +91,7 @@ class MortarPair:
     `surface_axes`, of tangents that the slave carries; None for none.  areas (nc,): undeformed,
     around the slaves, of `fading`; None: nodes that hardly anything faces drop out.  whole
     (nc,): undeformed, those that stresses of the law were made forces with; None: they stay.
+    ridges (nc,): of `contact.ridges`, undeformed; None for none.
     """
 
     slaves: Index
@@ -102,6 +104,7 @@ class MortarPair:
     axes: sparse.csr_array | None = None
     areas: Array | None = None
     whole: Array | None = None
+    ridges: Array | None = None
 
     @cached_property
     def both(self) -> Skin:
@@ -160,9 +163,9 @@ class MortarMeeting:
         return None if self.axes is None else (self.axes @ self.x).reshape(-1, 2, 3)
 
     @cached_property
-    def facing(self) -> FacedNormals:
+    def facing(self) -> AgreedNormals:
         """What normals come from."""
-        return FacedNormals(self)
+        return AgreedNormals(self)
 
     @property
     def normals(self) -> Array:

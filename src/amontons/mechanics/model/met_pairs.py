@@ -18,6 +18,7 @@ from ..contact.free_normals import FreeNormals
 from ..contact.geometry import Plane
 from ..contact.grown_areas import GrownAreas
 from ..contact.overlap import is_itself
+from ..contact.ridges import ridges
 from .supports import locate
 
 if TYPE_CHECKING:
@@ -58,14 +59,16 @@ def met_pairs(model: Model, slaves: list[Index], linear: Discretisation) -> list
         fades = not contact.tied and contact.tresca is None
         areas = areas_around(skins[0], nodes, X) if fades else None
         whole = own.rows.weights
+        bent = ridges(skins[0], nodes, X) if fades else None
+        bent = None if bent is None or not bent.any() else bent
         if len(meshes) == 2 and is_itself(*meshes[0], *meshes[1]):
             pair = folded(nodes, skins[0], is_free[nodes], X, names)
-            out.append(replace(pair, axes=axes, areas=areas, whole=whole))
+            out.append(replace(pair, axes=axes, areas=areas, whole=whole, ridges=bent))
             continue
         master = Skin.joined(skins[1:])
         pair = MortarPair(nodes, skins[0], master, is_free[nodes], names, axes=axes)
         if not contact.tied:
-            out.append(replace(pair, areas=areas, whole=whole))
+            out.append(replace(pair, areas=areas, whole=whole, ridges=bent))
             continue
         blocks = sparse.bsr_array(linear.stored_stiffness, blocksize=(d, d))
         beside = (np.ones(len(blocks.indices)), blocks.indices, blocks.indptr)

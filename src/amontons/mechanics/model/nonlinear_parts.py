@@ -151,8 +151,10 @@ class NonlinearParts:
 
     def without_fading(self) -> NonlinearParts:
         """The same with nodes that drop out where hardly anything faces them."""
-        pairs = tuple(replace(pair, areas=None) if isinstance(pair, MortarPair) else pair
-                      for pair in self.contact.pairs)  # fmt: skip
+        pairs = tuple(
+            replace(pair, areas=None, ridges=None) if isinstance(pair, MortarPair) else pair
+            for pair in self.contact.pairs
+        )
         return replace(self, contact=replace(self.contact, pairs=pairs))
 
     @cached_property
