@@ -5,6 +5,7 @@ import pytest
 
 import amontons as am
 from amontons.analysis.paths.parametrised import path_of
+from amontons.analysis.paths.point_fields import fields_at
 
 
 def block(share=1.0, mu=0.3):
@@ -96,6 +97,20 @@ def test_the_path_over_the_load_is_that_of_load_steps(make, changes, patterns):
         np.testing.assert_allclose(found.r, solved.r, atol=1e-8)
         seen.add(found.pattern)
     assert seen >= patterns
+
+
+def test_fields_of_a_point_are_those_of_supports_at_its_time():
+    """Forces and areas too, of reports: not only displacements."""
+    steady, solved = die(), am.solve(die(0.5), tolerance=1e-10)
+    top = am.Fix("upper.top", lambda x, t: (t, -0.2 * t))
+    timed = am.Model(steady.bodies, [steady.supports[0], top], steady.contacts)
+    branch = am.follow(timed, at=0.5, max_points=2)
+    (y,) = branch.at(0.5)
+    fields = fields_at(timed, branch, branch.problem.solution(y, 0.5), 0.5)
+    for name in ("displacement", "reaction"):
+        for own, told in zip(getattr(solved, name), getattr(fields, name), strict=True):
+            np.testing.assert_allclose(told, own, atol=1e-8)
+    np.testing.assert_allclose(fields.force, solved.force, atol=1e-8)
 
 
 @pytest.mark.parametrize(("make", "sticks"), [(block, "l"), (die, "-"), (cubes, "s")])

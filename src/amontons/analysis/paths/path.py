@@ -28,6 +28,7 @@ from ...core.arrays import Matrix
 from ...core.clock import NEVER, Deadline
 from ...core.faces import Shown
 from ...core.files import write_bytes
+from ...core.warned import ResultWarning
 from ...problem.judge.measures import Measure
 from ...problem.solution import Convergence, Outcome, Step
 from .events import Event, EventKind, Point, Stop
@@ -108,6 +109,7 @@ class Branch(Shown):
 
     states (points, n), parameter, arclength (points,): arclength is 0 at the start and negative
     before it.  linear: the curve is straight between two points, so that `at` is exact.
+    model: whose solutions the points are, where that is known.
     """
 
     problem: PathProblem
@@ -118,6 +120,7 @@ class Branch(Shown):
     seconds: float = 0.0
     name: str = "parameter"
     closed: bool = field(default=False)
+    model: Model | None = None
 
     def __len__(self) -> int:
         return len(self.points)
@@ -156,6 +159,15 @@ class Branch(Shown):
             point.state if made is None else made(point.state, point.parameter)
             for point in self.points
         ]
+
+    @cached_property
+    def warnings(self) -> tuple[ResultWarning, ...]:
+        """Reasons to doubt points of it, with the first parameter; none without a model."""
+        if self.model is None:
+            return ()
+        from .point_fields import branch_warnings
+
+        return branch_warnings(self.model, self)
 
     @property
     def folds(self) -> tuple[Event, ...]:
@@ -237,6 +249,7 @@ class Branch(Shown):
             "events": [event.record() for event in self.events],
             "stops": [stop.name.lower() for stop in self.stops],
             "closed": self.closed,
+            "warnings": [warning.record for warning in self.warnings],
         }
 
     def __str__(self) -> str:
@@ -247,6 +260,7 @@ class Branch(Shown):
             f"branch of {len(self)} points, {self.name} {low:.6g} … {high:.6g}; "
             f"folds: {folds}; {changes} changes of status; ends: "
             + ", ".join(stop.name.lower().replace("_", " ") for stop in self.stops)
+            + "".join(f"\n{warning}" for warning in self.warnings)
         )
 
 

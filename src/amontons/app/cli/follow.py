@@ -120,7 +120,9 @@ def record(
     return {
         "schema": SCHEMA, "parameter": parameter, "interval": list(interval),
         "points": rows("points"), "events": rows("events"),
-        "branches": [{"stops": part["stops"], "closed": part["closed"]} for part in parts],
+        "branches": [
+            {key: part[key] for key in ("stops", "closed", "warnings")} for part in parts
+        ],
         "complete": complete, "at": list(at), "whole": None if whole is None else list(whole),
         "undecided": [list(span) for span in undecided], "reason": reason,
         "versions": versions(),

@@ -3,16 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from ...analysis.paths.events import EventKind
 from ...analysis.paths.path import Branch
-from ...mechanics.model.fields import ContactFields, by_body
-from ...mechanics.steps.system import Motion
-from ...mechanics.steps.timed import steady
+from ...analysis.paths.point_fields import fields_at
 from ..units import Units
 from .charts import chart, line, rounded
 from .page import Page, Table
@@ -70,8 +67,14 @@ def curves_page(
         facts=[Table("Curves", ("", ""), facts),
                Table("How it was solved", ("", ""), version_rows())],
         tables=[_events(branches, name)], charts=[curve], stage=stage, states=states,
-        by=name, units=units,
+        by=name, units=units, warnings=_warnings(branches),
     )  # fmt: skip
+
+
+def _warnings(branches: Sequence[Branch]) -> tuple[str, ...]:
+    """Those of all branches, each kind once."""
+    told = {w.name: f"{w.message} [{w.name}]" for b in reversed(branches) for w in b.warnings}
+    return tuple(told.values())
 
 
 def _heights(branch: Branch) -> list[float]:
@@ -90,24 +93,11 @@ def _state(stage: Stage, model: Model, branch: Branch, index: int, prefix: str) 
     point = branch[index]
     problem: Any = branch.problem
     solution = problem.solution(point.state, point.parameter)
-    fields = _fields(model, branch, solution, point.parameter)
+    fields = fields_at(model, branch, solution, point.parameter)
     return stage.state(
         fields, solution, parameter=point.parameter,
         label=f"{prefix}{branch.name} = {point.parameter:.5g}",
     )  # fmt: skip
-
-
-def _fields(model: Model, branch: Branch, solution: Any, p: float) -> ContactFields:
-    """Fields of a point: supports stand where the load, or the time, at that point has them."""
-    body = steady(model)
-    if branch.name != "load":
-        return body.recover(solution)
-    motion = Motion(model)
-    if not motion.is_timed:
-        return body.with_load(p).recover(solution)
-    parts = body.discretisation
-    whole = parts.spread(solution.v, motion.applied(p)[1])
-    return replace(body.recover(solution), displacement=by_body(body.bodies, parts, whole))
 
 
 def _verdict(branches: Sequence[Branch], reason: str, name: str) -> tuple[str, str]:
