@@ -188,14 +188,17 @@ class Branch(Shown):
         """Sign of det J_y on the line from every point to the next, (points - 1,).
 
         1 as without friction, -1 as between two folds, 0 where it is not defined.  It changes
-        only where the parameter turns back.
+        only where the parameter turns back, and at branch points inside of a piece.
         """
         from .corrector import determinant_sign
 
         sense = np.sign(np.diff(self.parameter)).astype(np.int8)
         found = np.zeros(len(sense), dtype=np.int8)
-        ends = np.flatnonzero(np.diff(sense)) + 1
-        for run in np.split(np.arange(len(sense)), ends) if len(sense) else ():
+        met = [e.arclength for e in self.events if e.kind is EventKind.BRANCH]
+        ends = {*(np.flatnonzero(np.diff(sense)) + 1).tolist(),
+                *np.searchsorted(self.arclength, met).tolist()}  # fmt: skip
+        inner = sorted(ends - {0, len(sense)})
+        for run in np.split(np.arange(len(sense)), inner) if len(sense) else ():
             a, b = self.points[run[len(run) // 2]], self.points[run[len(run) // 2] + 1]
             y, p = (a.state + b.state) / 2, (a.parameter + b.parameter) / 2
             found[run] = determinant_sign(self.problem.jacobian(y, p)[0])

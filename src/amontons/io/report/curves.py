@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from ...analysis.paths.events import EventKind
+from ...analysis.paths.large_path import LargePath
 from ...analysis.paths.path import Branch
 from ...analysis.paths.point_fields import fields_at
 from ..units import Units
@@ -102,13 +103,17 @@ def _state(stage: Stage, model: Model, branch: Branch, index: int, prefix: str) 
 
 def _verdict(branches: Sequence[Branch], reason: str, name: str) -> tuple[str, str]:
     folds = sum(len(b.folds) for b in branches)
-    text = reason or (
-        "Closed branches that pass none of these points are not seen; “--all” asks for them."
-    )
+    met = sum(e.kind is EventKind.BRANCH and not e.is_fold for b in branches for e in b.events)
+    large = any(isinstance(b.problem, LargePath) for b in branches)
+    ask = "am.multistart(model) looks for others" if large else "“--all” asks for them"
+    text = reason or f"Closed branches that pass none of these points are not seen; {ask}."
     if folds:
         return f"No: {folds} folds, so some values of the {name} have several solutions", text
     if len(branches) > 1:
         return f"No: {len(branches)} branches over the same {name}", text
+    if met:
+        points = "a branch point" if met == 1 else f"{met} branch points"
+        return f"No: other curves leave this one at {points}", text
     return "No second solution on this curve", text
 
 
