@@ -149,6 +149,55 @@ def test_derivatives_on_pieces_also_below_no_friction(make, parameter):
         np.testing.assert_allclose((below + above)[told], 2 * at[told], atol=1e-12)
 
 
+UNIT, SHEAR, LAME = np.eye(3), 0.385, 0.577
+MODULI = LAME * np.einsum("ij,kl->ijkl", UNIT, UNIT) + SHEAR * (
+    np.einsum("ik,jl->ijkl", UNIT, UNIT) + np.einsum("il,jk->ijkl", UNIT, UNIT)
+)
+
+
+def crushed(least):
+    """Saint Venant-Kirchhoff, no number where tr C is below least()."""
+
+    def told(C, values):
+        kept = np.trace(C, axis1=1, axis2=2) >= least()
+        return np.where(kept.reshape(-1, *[1] * (values.ndim - 1)), values, np.nan)
+
+    def stress(C):
+        E = (C - UNIT) / 2
+        return told(C, np.einsum("ijkl,nkl->nij", MODULI, E))
+
+    def energy(C):
+        E = (C - UNIT) / 2
+        return told(C, np.einsum("nij,ijkl,nkl->n", E, MODULI, E) / 2)
+
+    def moduli(C):
+        return told(C, np.broadcast_to(MODULI, (len(C), 3, 3, 3, 3)))
+
+    return am.UserEnergy(energy, stress, moduli)
+
+
+def test_a_curve_that_ends_where_an_energy_is_no_number_says_where():
+    least = [0.0]
+    body = am.Body(am.box((1, 1), cells=1), crushed(lambda: least[0]), name="cube")
+    model = am.Model([body], [am.Fix("top", (0, -0.2))],
+                     [am.Contact("bottom", am.Plane((0, 1)), mu=0.3)])  # fmt: skip
+    least[0] = 2.85
+    branch = am.follow(model, at=0.1)
+    assert branch.stops[1] is am.Stop.STEP_TOO_SMALL
+    detail = branch.events[-1].detail
+    assert "energy is not a finite number" in detail
+    assert "of body 'cube'" in detail
+
+
+def test_starts_without_numbers_and_models_without_contacts_are_refused():
+    branch = am.follow(die(), at=0.5, max_points=2)
+    with pytest.raises(am.InvalidInput, match="start: expected finite numbers"):
+        am.follow(die(), start=np.full_like(branch[0].state, np.nan), at=0.5)
+    free = am.Model(die().bodies, die().supports, [])
+    with pytest.raises(am.UnsupportedForm, match="without contacts no path is followed"):
+        am.follow(free)
+
+
 class Touch:
     """y - p + max(0, m(p)) with m > 0 from 0.3 to 0.302: two borders within one step."""
 

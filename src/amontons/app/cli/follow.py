@@ -159,6 +159,6 @@ def _show(title: str, parameter: str, branches: list[Branch], reason: str, place
 
 def _way(event: Event) -> str:
     if event.stop is not None:
-        return event.stop.advice
+        return f"{event.stop.advice} {event.detail}".strip()
     words = [str(word) for word in (event.before, event.after) if word is not None]
     return " -> ".join(shortened(word, SHOWN) for word in words)

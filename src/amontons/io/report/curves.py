@@ -130,7 +130,7 @@ def _events(branches: Sequence[Branch], name: str) -> Table:
 
 def _way(event: Any) -> str:
     if event.stop is not None:
-        return event.stop.advice
+        return f"{event.stop.advice} {event.detail}".strip()
     words = [str(w) for w in (event.before, event.after) if w is not None]
     return " → ".join(w if len(w) <= 40 else f"{w[:39]}…" for w in words)
 
