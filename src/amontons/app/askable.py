@@ -59,9 +59,10 @@ def check_followed(problem: Any, verb: str, limit: TimeLimit) -> None:
     discrete = checked(problem)
     check_has_W(discrete, verb, limit)
     if not discrete.contacts:
-        raise UnsupportedForm(
-            f"{verb}: without contacts the state is in proportion to the load, one solve is all"
-        )
+        why = "the state is in proportion to the load, one solve is all"
+        if discrete.kind is not FrictionProblem:
+            why = "no path is followed; add one that stays open, with an obstacle far away"
+        raise UnsupportedForm(f"{verb}: without contacts {why}")
 
 
 def check_has_W(problem: FrictionProblem | Model, verb: str, limit: TimeLimit) -> None:

@@ -183,7 +183,8 @@ def follow(
     along: one of the tangents of `first_order` at the start, to go that way only.
     limits: max_points (per direction), time_limit (seconds for all), callback(point, event),
     which stops by returning True.
-    Each end of the branch has a named reason.
+    Each end of the branch has a named reason; `warnings` of that of a model are reasons to
+    doubt its states, as those of solutions.
     """
     from ..analysis.paths import asked, checks
     from ..analysis.paths.following import Limits, follow_path
@@ -193,8 +194,10 @@ def follow(
     check_followed(problem, "follow", bounds.deadline)
     path, y, p = asked.on_path(problem, parameter, bounds, checked_base(base), start, at)
     if along is None:
-        return follow_path(path, y, p, bounds, options=options)
-    return asked.followed_along(path, y, p, bounds, options, along)
+        branch = follow_path(path, y, p, bounds, options=options)
+    else:
+        branch = asked.followed_along(path, y, p, bounds, options, along)
+    return replace(branch, model=_model(problem))
 
 
 def first_order(
@@ -239,7 +242,16 @@ def diagram(
     values = None if at is None else checks.checked_values(at, bounds.interval)
     check_has_W(checked(problem), "diagram", bounds.deadline)
     path: Any = path_of(problem, parameter, bounds.interval, checked_base(base))
-    return bifurcation_diagram(path, bounds, values, options=options)
+    found = bifurcation_diagram(path, bounds, values, options=options)
+    known = (replace(branch, model=_model(problem)) for branch in found.branches)
+    return replace(found, branches=tuple(known))
+
+
+def _model(problem: Any) -> Model | None:
+    """The problem where it is a model, of whose states there may be doubts."""
+    from ..mechanics.model import Model
+
+    return problem if isinstance(problem, Model) else None
 
 
 @searching("uniqueness")

@@ -101,6 +101,8 @@ def test_a_branch_point_of_a_bent_curve_is_located_to_rounding(c, matrix):
     assert len(event.directions) == 4
     across = np.abs(event.directions @ [1.0, 0.0, 0.0]) > 0.5
     assert across.sum() == 2  # the other line leaves along x
+    before = branch.parameter[:-1] < event.parameter - 1e-9
+    np.testing.assert_array_equal(branch.orientation, np.where(before, 1, -1))  # of c - sin p
 
 
 def test_a_branch_point_of_a_bent_curve_is_located_to_rounding_on_the_fork_too():

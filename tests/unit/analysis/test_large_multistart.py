@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 
 import amontons as am
+from amontons.mechanics.model.worst_cells import turned_corner
 
 TURN = 0.023
 
@@ -52,6 +53,19 @@ def test_a_strip_between_two_bodies_buckles_to_either_side():
     assert aside[0] < -0.1 < 0.1 < aside[-1]
     assert aside[0] == pytest.approx(-aside[-1], abs=1e-6)
     assert all(solution.converged for solution in found.solutions)
+
+
+def test_no_solution_has_cells_that_are_inside_out():
+    """Another equilibrium has a corner that is, which no point of integration feels."""
+    body = am.Body(am.box((0.8, 1), cells=2, origin=(-0.4, 0)), am.NeoHookean(1.0, 0.3),
+                   integration="full")  # fmt: skip
+    model = am.Model([body], [am.Fix("top", (0, -0.6))],
+                     [am.Contact("bottom", am.Plane((0, 1)), mu=0.3)])  # fmt: skip
+    found = am.multistart(model, starts=12)
+    discrete = model.discrete_problem()
+    assert len(found) == 3  # upright, and bent to either side
+    for solution in found.solutions:
+        assert turned_corner(body.mesh, discrete.displacement(solution.v)) == ""
 
 
 def test_starts_and_time_are_limits():

@@ -5,6 +5,7 @@ import pytest
 
 import amontons as am
 from amontons.analysis.paths.parametrised import path_of
+from amontons.analysis.paths.point_fields import fields_at
 
 
 def block(share=1.0, mu=0.3):
@@ -98,6 +99,20 @@ def test_the_path_over_the_load_is_that_of_load_steps(make, changes, patterns):
     assert seen >= patterns
 
 
+def test_fields_of_a_point_are_those_of_supports_at_its_time():
+    """Forces and areas too, of reports: not only displacements."""
+    steady, solved = die(), am.solve(die(0.5), tolerance=1e-10)
+    top = am.Fix("upper.top", lambda x, t: (t, -0.2 * t))
+    timed = am.Model(steady.bodies, [steady.supports[0], top], steady.contacts)
+    branch = am.follow(timed, at=0.5, max_points=2)
+    (y,) = branch.at(0.5)
+    fields = fields_at(timed, branch, branch.problem.solution(y, 0.5), 0.5)
+    for name in ("displacement", "reaction"):
+        for own, told in zip(getattr(solved, name), getattr(fields, name), strict=True):
+            np.testing.assert_allclose(told, own, atol=1e-8)
+    np.testing.assert_allclose(fields.force, solved.force, atol=1e-8)
+
+
 @pytest.mark.parametrize(("make", "sticks"), [(block, "l"), (die, "-"), (cubes, "s")])
 def test_the_path_over_the_friction_is_that_of_problems_with_it(make, sticks):
     branch = am.follow(make(), "friction", (0.0, 1.0))
@@ -132,6 +147,55 @@ def test_derivatives_on_pieces_also_below_no_friction(make, parameter):
     if parameter == "friction":  # margins are straight lines, too
         told = np.isfinite(at)
         np.testing.assert_allclose((below + above)[told], 2 * at[told], atol=1e-12)
+
+
+UNIT, SHEAR, LAME = np.eye(3), 0.385, 0.577
+MODULI = LAME * np.einsum("ij,kl->ijkl", UNIT, UNIT) + SHEAR * (
+    np.einsum("ik,jl->ijkl", UNIT, UNIT) + np.einsum("il,jk->ijkl", UNIT, UNIT)
+)
+
+
+def crushed(least):
+    """Saint Venant-Kirchhoff, no number where tr C is below least()."""
+
+    def told(C, values):
+        kept = np.trace(C, axis1=1, axis2=2) >= least()
+        return np.where(kept.reshape(-1, *[1] * (values.ndim - 1)), values, np.nan)
+
+    def stress(C):
+        E = (C - UNIT) / 2
+        return told(C, np.einsum("ijkl,nkl->nij", MODULI, E))
+
+    def energy(C):
+        E = (C - UNIT) / 2
+        return told(C, np.einsum("nij,ijkl,nkl->n", E, MODULI, E) / 2)
+
+    def moduli(C):
+        return told(C, np.broadcast_to(MODULI, (len(C), 3, 3, 3, 3)))
+
+    return am.UserEnergy(energy, stress, moduli)
+
+
+def test_a_curve_that_ends_where_an_energy_is_no_number_says_where():
+    least = [0.0]
+    body = am.Body(am.box((1, 1), cells=1), crushed(lambda: least[0]), name="cube")
+    model = am.Model([body], [am.Fix("top", (0, -0.2))],
+                     [am.Contact("bottom", am.Plane((0, 1)), mu=0.3)])  # fmt: skip
+    least[0] = 2.85
+    branch = am.follow(model, at=0.1)
+    assert branch.stops[1] is am.Stop.STEP_TOO_SMALL
+    detail = branch.events[-1].detail
+    assert "energy is not a finite number" in detail
+    assert "of body 'cube'" in detail
+
+
+def test_starts_without_numbers_and_models_without_contacts_are_refused():
+    branch = am.follow(die(), at=0.5, max_points=2)
+    with pytest.raises(am.InvalidInput, match="start: expected finite numbers"):
+        am.follow(die(), start=np.full_like(branch[0].state, np.nan), at=0.5)
+    free = am.Model(die().bodies, die().supports, [])
+    with pytest.raises(am.UnsupportedForm, match="without contacts no path is followed"):
+        am.follow(free)
 
 
 class Touch:

@@ -4,11 +4,13 @@ import base64
 import json
 import re
 import zlib
+from dataclasses import replace
 
 import numpy as np
 import pytest
 
 import amontons as am
+from amontons.analysis.paths.events import Event
 from amontons.core.errors import NotWritten
 from amontons.io.case import read_case
 from amontons.io.plots.style import COLOURS
@@ -191,6 +193,22 @@ def test_units_of_a_case(tmp_path):
     assert Units("in", "lbf").stress == "lbf/in²"
     with pytest.raises(am.FileFormatError, match=r"units\.lenght: unknown key; did you mean"):
         read_case("example:cube", ["units.lenght=m"])
+
+
+def test_no_verdict_is_given_of_large_strains():
+    """That of the tangent problem, "one solution, whatever the load", is none of the model."""
+    body = am.Body(am.box((1, 1), cells=2), am.NeoHookean(1.0, 0.3))
+    model = am.Model([body], [am.Fix("top", (0, -0.1))],
+                     [am.Contact("bottom", am.Plane((0, 1)), mu=0.1)])  # fmt: skip
+    found = am.solve(model)
+    title, text = page_of(found).verdict
+    assert title == "Not examined"
+    assert "am.multistart(model)" in text
+    assert am.uniqueness(found.solution.problem).verdict is am.Verdict.UNIQUE_EVERY_LOAD
+    branch = am.follow(model, max_points=2)
+    assert "am.multistart(model)" in page_of(branch).verdict[1]
+    crossed = replace(branch, events=(Event(am.EventKind.BRANCH, 0.0, branch[0].state),))
+    assert page_of(crossed).verdict[0] == "No: other curves leave this one at a branch point"
 
 
 def test_verdicts_in_words(solution):

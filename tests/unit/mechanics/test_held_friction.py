@@ -100,3 +100,13 @@ def test_paths_leave_out_what_solutions_have():
     (step,) = am.evolve(timed, am.QuasiStatic(1.0), until=1.0)
     np.testing.assert_allclose(step.resultant(), solution.resultant, rtol=1e-6)
     assert not step.warnings
+
+
+def test_a_branch_tells_what_it_leaves_out():
+    """Curves of a model have the warnings of its states."""
+    branch = am.follow(dragged_underside((0.05, None)), at=0.5, max_points=2)
+    (warning,) = branch.warnings
+    assert warning.name == "held-without-friction"
+    assert "paths leave out" in str(branch)
+    assert "100 % of what friction bears is missing" in str(warning)
+    assert branch.record()["warnings"] == [warning.record]

@@ -76,6 +76,8 @@ def check_size(path: FrictionPath | LargePath, y: Array) -> None:
             f"start: expected a solution, or its v of {path.step.unknowns} entries, "
             f"got {len(y)} numbers"
         )
+    if not np.isfinite(y).all():
+        raise InvalidInput("start: expected finite numbers")
 
 
 def check_start(problem: PathProblem, y: Array, p: float) -> None:

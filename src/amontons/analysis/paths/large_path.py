@@ -113,6 +113,14 @@ class LargePath(ABC):
         except InvertedCells:
             return np.full(y.shape, np.inf)
 
+    def remark(self, y: Array, p: float) -> str:
+        """Why there are no forces at a state: the cell that is inverted; "" where there are."""
+        try:
+            self.at(p).residual(y)
+        except InvertedCells as reason:
+            return str(reason)
+        return ""
+
     def jacobian(self, y: Array, p: float) -> tuple[sparse.csc_array, Array]:
         """dF/dy, (n, n), and dF/dp, (n,), of the active piece.
 

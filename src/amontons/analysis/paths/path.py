@@ -28,6 +28,7 @@ from ...core.arrays import Matrix
 from ...core.clock import NEVER, Deadline
 from ...core.faces import Shown
 from ...core.files import write_bytes
+from ...core.warned import ResultWarning
 from ...problem.judge.measures import Measure
 from ...problem.solution import Convergence, Outcome, Step
 from .events import Event, EventKind, Point, Stop
@@ -108,6 +109,7 @@ class Branch(Shown):
 
     states (points, n), parameter, arclength (points,): arclength is 0 at the start and negative
     before it.  linear: the curve is straight between two points, so that `at` is exact.
+    model: whose solutions the points are, where that is known.
     """
 
     problem: PathProblem
@@ -118,6 +120,7 @@ class Branch(Shown):
     seconds: float = 0.0
     name: str = "parameter"
     closed: bool = field(default=False)
+    model: Model | None = None
 
     def __len__(self) -> int:
         return len(self.points)
@@ -157,6 +160,15 @@ class Branch(Shown):
             for point in self.points
         ]
 
+    @cached_property
+    def warnings(self) -> tuple[ResultWarning, ...]:
+        """Reasons to doubt points of it, with the first parameter; none without a model."""
+        if self.model is None:
+            return ()
+        from .point_fields import branch_warnings
+
+        return branch_warnings(self.model, self)
+
     @property
     def folds(self) -> tuple[Event, ...]:
         """The events where the parameter turns back, branch points among them."""
@@ -176,14 +188,17 @@ class Branch(Shown):
         """Sign of det J_y on the line from every point to the next, (points - 1,).
 
         1 as without friction, -1 as between two folds, 0 where it is not defined.  It changes
-        only where the parameter turns back.
+        only where the parameter turns back, and at branch points inside of a piece.
         """
         from .corrector import determinant_sign
 
         sense = np.sign(np.diff(self.parameter)).astype(np.int8)
         found = np.zeros(len(sense), dtype=np.int8)
-        ends = np.flatnonzero(np.diff(sense)) + 1
-        for run in np.split(np.arange(len(sense)), ends) if len(sense) else ():
+        met = [e.arclength for e in self.events if e.kind is EventKind.BRANCH]
+        ends = {*(np.flatnonzero(np.diff(sense)) + 1).tolist(),
+                *np.searchsorted(self.arclength, met).tolist()}  # fmt: skip
+        inner = sorted(ends - {0, len(sense)})
+        for run in np.split(np.arange(len(sense)), inner) if len(sense) else ():
             a, b = self.points[run[len(run) // 2]], self.points[run[len(run) // 2] + 1]
             y, p = (a.state + b.state) / 2, (a.parameter + b.parameter) / 2
             found[run] = determinant_sign(self.problem.jacobian(y, p)[0])
@@ -237,6 +252,7 @@ class Branch(Shown):
             "events": [event.record() for event in self.events],
             "stops": [stop.name.lower() for stop in self.stops],
             "closed": self.closed,
+            "warnings": [warning.record for warning in self.warnings],
         }
 
     def __str__(self) -> str:
@@ -247,6 +263,7 @@ class Branch(Shown):
             f"branch of {len(self)} points, {self.name} {low:.6g} … {high:.6g}; "
             f"folds: {folds}; {changes} changes of status; ends: "
             + ", ".join(stop.name.lower().replace("_", " ") for stop in self.stops)
+            + "".join(f"\n{warning}" for warning in self.warnings)
         )
 
 

@@ -21,6 +21,7 @@ from .walk import Found, Walk
 
 Array = NDArray[np.float64]
 NEARLY, AHEAD = 1e-3, 10.0  # over the smallest step: to measure rates, to look for a corner
+FURTHER = 10.0 ** np.arange(5)  # over the smallest step: where to ask why none leads on
 MET = 10.0  # borders that a located point may miss, in what locates one of them
 LOCATED = 1e-3  # margin of a located border, relative to the one that counts as zero
 
@@ -55,9 +56,18 @@ class WalkByPieces(Walk):
     def _stuck(self) -> Found:
         corner = self._corner_ahead()
         if corner is None:
-            return [(self.here(), self._ended(Stop.STEP_TOO_SMALL))]
+            return [(self.here(), self._ended(Stop.STEP_TOO_SMALL, self._remark()))]
         self._move(corner)
         return self._first_order()
+
+    def _remark(self) -> str:
+        """What the problem, where it can tell, says of states just ahead, the nearest first."""
+        tell = getattr(self.problem, "remark", None)
+        if tell is None:
+            return ""
+        steps = self.options.min_step * FURTHER
+        told = (tell(*self.spot.ahead(float(step))) for step in steps)
+        return next((words for words in told if words), "")
 
     def _corner_ahead(self) -> Spot | None:
         """A solution just ahead on the tangent, at a border beyond which no curve goes on.

@@ -49,7 +49,8 @@ REASON = "there is no proof that there are no others"
 class LargeSolutions(Told):
     """Solutions that were found, the first by load steps; never known to be all.
 
-    starts: from which Newton's method began; failed: from which it found nothing.
+    starts: from which Newton's method began; failed: from which it found nothing new.  States
+    with a corner inside out that the first does not have are no solutions.
     """
 
     solutions: tuple[FrictionSolution, ...]
@@ -169,6 +170,8 @@ class _Search:
         except (InvertedCells, SingularOperator):
             return False
         if not found.converged or found.v is None or self._is_known(found.v):
+            return False
+        if problem.astray(found.v, self._state(0)):  # no body gets there
             return False
         self.known.append(found)
         return True

@@ -120,7 +120,9 @@ def record(
     return {
         "schema": SCHEMA, "parameter": parameter, "interval": list(interval),
         "points": rows("points"), "events": rows("events"),
-        "branches": [{"stops": part["stops"], "closed": part["closed"]} for part in parts],
+        "branches": [
+            {key: part[key] for key in ("stops", "closed", "warnings")} for part in parts
+        ],
         "complete": complete, "at": list(at), "whole": None if whole is None else list(whole),
         "undecided": [list(span) for span in undecided], "reason": reason,
         "versions": versions(),
@@ -157,6 +159,6 @@ def _show(title: str, parameter: str, branches: list[Branch], reason: str, place
 
 def _way(event: Event) -> str:
     if event.stop is not None:
-        return event.stop.advice
+        return f"{event.stop.advice} {event.detail}".strip()
     words = [str(word) for word in (event.before, event.after) if word is not None]
     return " -> ".join(shortened(word, SHOWN) for word in words)

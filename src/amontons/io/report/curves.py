@@ -3,16 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from ...analysis.paths.events import EventKind
+from ...analysis.paths.large_path import LargePath
 from ...analysis.paths.path import Branch
-from ...mechanics.model.fields import ContactFields, by_body
-from ...mechanics.steps.system import Motion
-from ...mechanics.steps.timed import steady
+from ...analysis.paths.point_fields import fields_at
 from ..units import Units
 from .charts import chart, line, rounded
 from .page import Page, Table
@@ -70,8 +68,14 @@ def curves_page(
         facts=[Table("Curves", ("", ""), facts),
                Table("How it was solved", ("", ""), version_rows())],
         tables=[_events(branches, name)], charts=[curve], stage=stage, states=states,
-        by=name, units=units,
+        by=name, units=units, warnings=_warnings(branches),
     )  # fmt: skip
+
+
+def _warnings(branches: Sequence[Branch]) -> tuple[str, ...]:
+    """Those of all branches, each kind once."""
+    told = {w.name: f"{w.message} [{w.name}]" for b in reversed(branches) for w in b.warnings}
+    return tuple(told.values())
 
 
 def _heights(branch: Branch) -> list[float]:
@@ -90,35 +94,26 @@ def _state(stage: Stage, model: Model, branch: Branch, index: int, prefix: str) 
     point = branch[index]
     problem: Any = branch.problem
     solution = problem.solution(point.state, point.parameter)
-    fields = _fields(model, branch, solution, point.parameter)
+    fields = fields_at(model, branch, solution, point.parameter)
     return stage.state(
         fields, solution, parameter=point.parameter,
         label=f"{prefix}{branch.name} = {point.parameter:.5g}",
     )  # fmt: skip
 
 
-def _fields(model: Model, branch: Branch, solution: Any, p: float) -> ContactFields:
-    """Fields of a point: supports stand where the load, or the time, at that point has them."""
-    body = steady(model)
-    if branch.name != "load":
-        return body.recover(solution)
-    motion = Motion(model)
-    if not motion.is_timed:
-        return body.with_load(p).recover(solution)
-    parts = body.discretisation
-    whole = parts.spread(solution.v, motion.applied(p)[1])
-    return replace(body.recover(solution), displacement=by_body(body.bodies, parts, whole))
-
-
 def _verdict(branches: Sequence[Branch], reason: str, name: str) -> tuple[str, str]:
     folds = sum(len(b.folds) for b in branches)
-    text = reason or (
-        "Closed branches that pass none of these points are not seen; “--all” asks for them."
-    )
+    met = sum(e.kind is EventKind.BRANCH and not e.is_fold for b in branches for e in b.events)
+    large = any(isinstance(b.problem, LargePath) for b in branches)
+    ask = "am.multistart(model) looks for others" if large else "“--all” asks for them"
+    text = reason or f"Closed branches that pass none of these points are not seen; {ask}."
     if folds:
         return f"No: {folds} folds, so some values of the {name} have several solutions", text
     if len(branches) > 1:
         return f"No: {len(branches)} branches over the same {name}", text
+    if met:
+        points = "a branch point" if met == 1 else f"{met} branch points"
+        return f"No: other curves leave this one at {points}", text
     return "No second solution on this curve", text
 
 
@@ -135,7 +130,7 @@ def _events(branches: Sequence[Branch], name: str) -> Table:
 
 def _way(event: Any) -> str:
     if event.stop is not None:
-        return event.stop.advice
+        return f"{event.stop.advice} {event.detail}".strip()
     words = [str(w) for w in (event.before, event.after) if w is not None]
     return " → ".join(w if len(w) <= 40 else f"{w[:39]}…" for w in words)
 

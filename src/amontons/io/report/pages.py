@@ -22,6 +22,7 @@ from .page import Page, Table
 from .skin import Skin
 from .states import Stage, State
 from .words import (
+    UNPROVED,
     cost_table,
     judged_table,
     outcome_words,
@@ -51,18 +52,25 @@ def solve_page(output: Output, units: Units, title: str = "") -> Page:
         states = [stage.state(output.fields, found)]
     else:
         charts.insert(0, reaction_chart(found))
-    verdict = output.uniqueness
-    if verdict is None and isinstance(found.problem, FrictionProblem):
-        verdict = quick_verdict(found.problem, operations_of(record), found)
     return Page(
         "solve", title or output.title or found.problem.name or "friction problem",
         headline=_counted(found),
-        outcome=outcome_words(record), stamp=record.stamp, verdict=verdict_words(verdict),
+        outcome=outcome_words(record), stamp=record.stamp, verdict=_verdict(output),
         facts=[result_table(output, units), judged_table(output), cost_table(output)],
         warnings=(*(f"{w.message} [{w.name}]" for w in output.warnings), *output.notes),
         tables=pairs_table(output, units),
         charts=[c for c in charts if c], stage=stage, states=states or [], units=units,
     )  # fmt: skip
+
+
+def _verdict(output: Output) -> tuple[str, str]:
+    """What is known of other solutions; the tangent problem of large strains says little."""
+    found, verdict = output.solution, output.uniqueness
+    if output.model is not None and output.model.kind is not FrictionProblem:
+        return "Not examined", UNPROVED
+    if verdict is None and isinstance(found.problem, FrictionProblem):
+        verdict = quick_verdict(found.problem, operations_of(found.convergence), found)
+    return verdict_words(verdict)
 
 
 def _counted(found: FrictionSolution) -> str:

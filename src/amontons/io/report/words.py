@@ -29,6 +29,10 @@ MEASURES = {
 ASK = ("Ask with “amontons solve … --uniqueness”, “amontons uniqueness …”, or in Python with "
        "am.uniqueness(model).")  # fmt: skip
 
+UNPROVED = ("Nothing is proved of other solutions of this kind of model. At large strains "
+            "am.multistart(model) looks for some, am.follow(model) traces the curve of this "
+            "one over the load.")  # fmt: skip
+
 
 def verdict_words(found: Uniqueness | None) -> tuple[str, str]:
     """Title and text of a verdict; None: not asked."""

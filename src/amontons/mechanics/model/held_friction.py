@@ -31,8 +31,8 @@ SAME_PLANE = (
 )  # fmt: skip
 ALONG_PATHS = (
     "; paths leave out what friction these have",
-    "solve without PathCrossing, hold the body elsewhere, or take the other surface as the "
-    "slave",
+    "solve without a path (follow, PathCrossing), hold the body elsewhere, or take the other "
+    "surface as the slave",
 )  # fmt: skip
 
 
@@ -93,5 +93,5 @@ def _warning(
         "held-without-friction",
         f"contact on {contact.slave!r} with {contact.master!r}: supports hold {count} of its "
         f"contacts along the surface on which they slide, as at [{where}]{why[0]}, and about "
-        f"{100 * part:.2g} % of what friction bears is missing; {why[1]}",
+        f"{100 * part:.3g} % of what friction bears is missing; {why[1]}",
     )
