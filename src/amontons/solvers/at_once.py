@@ -105,7 +105,8 @@ def told(
         return None
     if not hidden <= BLUR * asked.tolerance:
         return None
-    r, u, (status, sliding) = together.r, together.u, together.states
+    r, u, states = together.r, together.u, together.states
+    status, sliding = states[0], states[1]  # a tuple of them takes longer
     if len(together.problems) > 1 or d == 2:
         a, b = together.sizes[p, 0], together.sizes[p + 1, 0]
         r, u = np.array(r[a:b, :d]), np.array(u[a:b, :d])

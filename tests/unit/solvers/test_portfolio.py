@@ -168,6 +168,20 @@ def test_a_first_track_that_ends_on_stacks_leaves_no_other_in_its_place(monkeypa
     assert spent["dear"] == pytest.approx(1e3, rel=0.01)  # the one chunk before others
 
 
+@pytest.mark.parametrize(("fall", "idle"), [(0.99, True), (0.5, False)])
+def test_what_follows_on_stacks_leaves_unless_it_comes_nearer(monkeypatch, fall, idle):
+    monkeypatch.setattr(State, "is_stacked", True)
+    monkeypatch.setattr(Track, "soon", lambda track: math.inf)
+    second = Entry("second", falling(fall, 1.0), stacked=400)
+    table = Entry("first", falling(0.9, 1.0)), second
+    racing = Race(state_of(random_delassus(0, 10)), table)
+    racing.tracks[0].advance()
+    list(racing._on_stacks(racing.tracks[0]))
+    track = next(t for t in racing.tracks if t.entry is second)
+    assert track.idle == idle
+    assert (len(track.errors) == race.IDLE + 1) == idle
+
+
 def test_broken_promises_count_less():
     def stalling(state):
         error = state.first_error

@@ -27,8 +27,9 @@ rest counts C / (GRACE F) times.  Besides
     stacks      where most contacts share faces of rigid bodies, reactions are many more than
                 balances: the method that solves such a problem at rest in a few steps follows
                 the first chunk, a shorter one, unless the first track promises to be there for
-                less, and has what it usually needs before all others; where chunks are brief it
-                waits with the others, and comes before them
+                less, and has what it usually needs before all others, if its second step is
+                nearer than its start; where chunks are brief it waits with the others, and
+                comes before them
     dear        the interior point, smoothing Newton, and steps and sweeps in turn, begin where
                 sweeps have cost as much as all steps and what smoothing Newton, or the latter,
                 usually need: where none helps these trials cost no more than sweeps do
@@ -59,6 +60,7 @@ WINDOW = 0.6  # last part of a track's cost from which its rate is told
 GRACE = 1.2  # times the cost at which a track has promised the goal: its promise is broken
 # What an error that stands takes on, of how long it has; part of it that is no fall.
 LULL, FALL = 2.0, 0.9
+IDLE = 2  # chunks on stacks after which a method has to have come nearer
 # Logarithm of the way to the goal, over that of the way to the best error, up to which that is
 # near; multiple of the best error at which it is taken to have been come by.
 NEAR, ALMOST = 1.5, 2.0
@@ -187,6 +189,14 @@ class Track:
         rest = math.log(error / self.state.goal) * (cost - before)
         return rest / math.log(fall) if fall > 1.0 else math.inf
 
+    @property
+    def idle(self) -> bool:
+        """True where its first steps have not come nearer than where it began.
+
+        On stacks the second step of the interior point does where some five are to be enough.
+        """
+        return len(self.errors) > IDLE and not self.errors[-1] < FALL * self.errors[0]
+
     def halved(self) -> bool:
         """True where its best error is half of what it was when this was last so."""
         halved = self.errors[-1] < 0.5 * min(self.mark, self.errors[0])
@@ -294,7 +304,7 @@ class Race:
             needed = entry.stacked * (state.relaxation_cost + CALL)
             track = Track(entry, state)
             self.tracks.append(track)
-            while track in self.tracks and track.cost < needed:
+            while track in self.tracks and track.cost < needed and not track.idle:
                 sooner = first in self.tracks and first.soon() < needed - track.cost
                 yield from self._go_on(first if sooner else track)
 

@@ -36,7 +36,7 @@ NEARER = 0.3  # error of that, of the track's own, at which it begins again from
 PATIENT = 600  # sweeps without halving its error, after which any better one will do
 TAKEN = 0.1  # error of the best reaction, of its own, at which a track goes on from that
 LEAST = 20  # sweeps of a chunk: a judgement costs as much as one
-EARLY = 10  # of the first one on stacks, see `sweeps_on_stacks`
+EARLY = 5  # of the first one on stacks, see `sweeps_on_stacks`
 BETWEEN = 200  # accelerated sweeps after each relaxation, and on while they halve the error
 RELAXED = 60  # steps of one relaxation at most
 # First smoothing, times the error per contact of the reaction that it starts from, or 0, from

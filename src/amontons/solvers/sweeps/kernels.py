@@ -110,11 +110,16 @@ def sweep_data(
     _, _, _, q, kind, parameters, rho = problem.kernel_data
     visits, ends = np.arange(len(q)), np.empty(0)
     if order is SweepOrder.APPROACH:
-        visits, ends = in_chunks(problem, by_approach(q))
+        visits, ends = problem.kept_alone(_visits_by_approach)
     return Sweep(
         b.indptr, b.indices, b.data, b.rows, q, kind, parameters, rho, b.diagonal, b.eliminated,
         visits, int(local), float(relaxation), float(close), int(steps), np.append(0.0, ends),
     )  # fmt: skip
+
+
+def _visits_by_approach(problem: FrictionProblem) -> tuple[NDArray[np.int64], Array]:
+    """See `in_chunks`."""
+    return in_chunks(problem, by_approach(problem.kernel_data[3]))
 
 
 def sweep_flops(s: Sweep, sweeps: int, local: float) -> float:
