@@ -141,7 +141,7 @@ def _of_lines(edges: Array, lines: Array) -> tuple[Array, Array, Mask, Mask]:
     first, start = there[0] >= 0, own[0] >= 0
     hit = (first != (there[1] >= 0)) & (start != (own[1] >= 0))
     t, s = (a[0] / np.where(hit, a[0] - a[1], 1.0) for a in (there, own))
-    return t, s, ~first, hit
+    return t, s, ~first, hit  # type: ignore[return-value]  # numpy types only counts
 
 
 def _sides(lines: Array, points: Array) -> tuple[Array, Array]:

@@ -22,13 +22,14 @@ TURNED = 0.1  # by how much more a corner may be inside out after a step that is
 def led_astray(parts: NonlinearParts, u: Array, before: Array, jumped: bool = True) -> str:
     """Why no step leads from displacements `before` to u (nodes, d), in words; "" for nothing.
 
-    jumped: over a jump.  What was so before it does not count: corners inside out, and bodies
-    that lay in each other almost as deep.  Small steps may lead there, as averages of gaps
-    do, and points of integration in front of a corner.
+    jumped: over a jump.  What was so before it does not count: corners as much inside out,
+    and bodies as deep in each other.  Small steps may lead there, as averages of gaps do, and
+    points of integration in front of a corner: without a jump it may be a little more.
     """
     over = "over a jump " if jumped else ""
     depth, told = deepest_overlap(parts, u)
-    if told and depth.share > deepest_overlap(parts, before, 0.0)[0].share + DEEP / 2:
+    slack = 0.0 if jumped else DEEP / 2
+    if told and depth.share > deepest_overlap(parts, before, 0.0)[0].share + slack:
         return over + told
     each = zip(
         parts.names, parts.bodies, np.split(u, parts.ends), np.split(before, parts.ends),
