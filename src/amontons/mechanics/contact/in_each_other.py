@@ -141,7 +141,7 @@ def _of_lines(edges: Array, lines: Array) -> tuple[Array, Array, Mask, Mask]:
     first, start = there[0] >= 0, own[0] >= 0
     hit = (first != (there[1] >= 0)) & (start != (own[1] >= 0))
     t, s = (a[0] / np.where(hit, a[0] - a[1], 1.0) for a in (there, own))
-    return t, s, ~first, hit  # type: ignore[return-value]  # numpy types only counts
+    return t, s, ~first, hit
 
 
 def _sides(lines: Array, points: Array) -> tuple[Array, Array]:
@@ -159,7 +159,7 @@ def _of_triangles(edges: Array, triangles: Array) -> tuple[Array, Array, Mask, M
     A = np.stack(sides, axis=2)
     volume = np.linalg.det(A)
     A[volume == 0] = np.eye(3)  # parallel: no cut
-    share = np.linalg.solve(A, (first - start)[:, :, None])[:, :, 0]
+    share: Array = np.linalg.solve(A, (first - start)[:, :, None])[:, :, 0].astype(np.float64)
     t, inner = share[:, 0], share[:, 1:]
     hit = (volume != 0) & (t >= 0) & (t < 1) & (inner >= 0).all(axis=1)
     hit &= inner.sum(axis=1) <= 1
