@@ -22,6 +22,10 @@ def test_corners_that_were_inside_out_before_do_not_count(dim, kind, order):
     assert turned_corner(mesh, np.zeros_like(u), u) == ""
 
 
+def _checked(steps, problem, v, tolerance):
+    return nonlinear._not_astray(iter(steps), problem, (problem, v), tolerance, jumped=True)
+
+
 def test_a_jump_to_cells_inside_out_is_none():
     """Its steps are shown until there; what was inside out at the start may stay so."""
     body = am.Body(am.box((1, 1), 2), am.NeoHookean(1.0, 0.3), name="body")
@@ -31,9 +35,9 @@ def test_a_jump_to_cells_inside_out_is_none():
     turned = v.copy()
     turned[-2:] = -0.6  # the corner (1, 1)
     steps = [(v, problem.reactions(v), np.inf), (turned, np.zeros((3, 2)), 1.0)]
-    shown = nonlinear._not_astray(iter(steps), problem, v, np.inf)
+    shown = _checked(steps, problem, v, np.inf)
     next(shown)
     with pytest.raises(Failed, match=r"over a jump the corner at \(1, 1\) .* in body 'body'"):
         next(shown)
-    assert len(list(nonlinear._not_astray(iter(steps), problem, turned, np.inf))) == 2
-    assert len(list(nonlinear._not_astray(iter(steps), problem, v, 0.0))) == 2  # on the way
+    assert len(list(_checked(steps, problem, turned, np.inf))) == 2
+    assert len(list(_checked(steps, problem, v, 0.0))) == 2  # on the way

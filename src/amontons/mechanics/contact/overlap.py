@@ -84,12 +84,15 @@ def winding_number(mesh: Mesh, point: Array) -> float:
     total = 0.0
     for block in mesh.boundary:
         x = mesh.points[corner_facets(block).nodes] - point
-        if mesh.dim == 2:
-            total += _angles(x) / (2 * np.pi)
-        else:
-            for second in range(1, x.shape[1] - 1):
-                total += _solid_angles(x[:, [0, second, second + 1]]) / (4 * np.pi)
+        for second in range(1, max(x.shape[1] - 1, 2)):
+            some = [0, second, second + 1] if mesh.dim == 3 else [0, 1]
+            total += winding_of(x[:, some])
     return total
+
+
+def winding_of(x: Array) -> float:
+    """How many times lines (k, 2, 2) or triangles (k, 3, 3) wind around the origin."""
+    return _angles(x) / (2 * np.pi) if x.shape[2] == 2 else _solid_angles(x) / (4 * np.pi)
 
 
 def _angles(x: Array) -> float:

@@ -16,6 +16,7 @@ from .fields import ContactFields
 from .flat_cells import flat_cells, turned_cells
 from .held_facets import held_facets
 from .held_friction import held_friction
+from .in_each_other import bodies_in_each_other
 from .loading import no_load
 from .locking import volumetric_locking
 from .matching import nodal_on_non_matching
@@ -45,6 +46,7 @@ OF_WHERE_NODES_ARE = (  # found there
     unfaced_slaves,
     flat_cells,
     turned_cells,
+    bodies_in_each_other,
 )
 OF_MOTIONS = (large_rotation, *OF_THE_START, *OF_WHERE_NODES_ARE)
 

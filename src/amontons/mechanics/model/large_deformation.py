@@ -359,9 +359,12 @@ class LargeDeformation(NonlinearProblem):
         return places_of_failure(self.parts, u, self.earlier, here.pieces % 4 > 0,
                                  None if first is None else (here.force, first))  # fmt: skip
 
-    def astray(self, v: Array, start: Array) -> str:
-        """Why no jump leads from the state `start` to v, see `after_jumps`; "" for nothing."""
-        return led_astray(self.parts, self.displacement(v), self.displacement(start))
+    def astray(
+        self, v: Array, known: tuple[LargeDeformation, Array], jumped: bool = True
+    ) -> str:
+        """Why no step leads from a known state to v, see `after_jumps`; "" for nothing."""
+        return led_astray(self.parts, self.displacement(v), known[0].displacement(known[1]),
+                          jumped)  # fmt: skip
 
     def closed_pieces(self, v: Array) -> list[Pieces]:
         """The active pieces with touching contacts stuck, then with all of them stuck."""

@@ -25,6 +25,7 @@ from ..elements.corotational import CorotationalBody
 from ..elements.hyperelasticity import HyperelasticBody, is_hyperelastic
 from ..elements.linear_body import LinearBody
 from .finite_checks import chains, check_nodes, check_supported
+from .in_each_other import outlines
 from .met_pairs import cleared, free_dofs, met_pairs, resistance
 from .tangent_structure import Numbering, pattern_of
 from .worst_cells import flattest, most_strained
@@ -148,6 +149,11 @@ class NonlinearParts:
     def growth(self, u: Array) -> Array | float:
         """Of `contact.grown_areas` at displacements u (nodes, d), (nc,); 1 for all of them."""
         return self.meet(u).growth if self.contact.law.has_stresses else 1.0
+
+    @cached_property
+    def outlines(self) -> tuple[tuple, ...]:
+        """Boundaries of bodies that meet, see `in_each_other`."""
+        return outlines(self)
 
     def without_fading(self) -> NonlinearParts:
         """The same with nodes that drop out where hardly anything faces them."""

@@ -8,6 +8,7 @@ from numpy.typing import NDArray
 from ..elements.cell_matrices import rule_of
 from ..meshes.cells import CELLS
 from ..meshes.check import determinant
+from ..meshes.linear_cells import ReferenceCell
 from ..meshes.mesh import Mesh
 
 Array = NDArray[np.float64]
@@ -28,21 +29,25 @@ def flattest(mesh: Mesh, u: Array) -> tuple[float, str]:
     return least, told
 
 
-def turned_corner(mesh: Mesh, u: Array, before: Array | None = None) -> str:
+def turned_corner(
+    mesh: Mesh, u: Array, before: Array | None = None, slack: float = 0.0
+) -> str:
     """The node of a cell that is turned inside out the most at u (n, dim), in words.
 
     "" for none.  Integration points may all be in front of it: energies do not feel it.
-    Nodes that were turned at displacements `before` (n, dim) do not count.
+    Nodes that were so at displacements `before` (n, dim) do not count: det F has to be below
+    what it was then, and below 0, by more than `slack`.
     """
     least, told, first = 0.0, "", 0
     for cells in mesh.cells:
         cell, x = CELLS[cells.kind], mesh.points[cells.nodes]
         moved = x + u[cells.nodes]
-        for c, at in enumerate(cell.corners if cell.kind != "pyramid" else ()):
+        for c, at in enumerate(cell.corners if _any_turned(cell, moved) else ()):
             ratio = determinant(cell.jacobians(moved, at)) / determinant(cell.jacobians(x, at))
             if before is not None:
                 then = determinant(cell.jacobians(x + before[cells.nodes], at))
-                ratio = np.where(then * determinant(cell.jacobians(x, at)) < 0, np.inf, ratio)
+                then = np.minimum(then / determinant(cell.jacobians(x, at)), 0.0)
+                ratio = np.where(ratio < then - slack, ratio, np.inf)
             k = int(np.where(np.isfinite(ratio), ratio, np.inf).argmin())
             if ratio[k] < least:
                 least, place = float(ratio[k]), ", ".join(f"{c:.4g}" for c in x[k, c])
@@ -53,6 +58,14 @@ def turned_corner(mesh: Mesh, u: Array, before: Array | None = None) -> str:
                 )
         first += len(cells.nodes)
     return told
+
+
+def _any_turned(cell: ReferenceCell, x: Array) -> bool:
+    """Whether some node of cells at x (k, nodes, dim) is inside out, at one look."""
+    if cell.kind == "pyramid":  # has no volume at its tip
+        return False
+    J = x.swapaxes(1, 2) @ cell.gradient(np.asarray(cell.corners))[:, None]
+    return not (determinant(J.reshape(-1, *J.shape[2:])) >= 0).all()
 
 
 def most_strained(mesh: Mesh, u: Array) -> str:

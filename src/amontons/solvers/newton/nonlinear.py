@@ -83,8 +83,11 @@ class NonlinearProblem(Problem):
         """What may be wrong at a state beyond which no equilibrium is found; "" for nothing."""
         return ""
 
-    def astray(self, v: Array, start: Array) -> str:
-        """Why no jump from a state leads to v though it is an equilibrium; "" for nothing."""
+    def astray(self, v: Array, known: Any, jumped: bool = True) -> str:
+        """Why no step leads to v though it is an equilibrium; "" for nothing.
+
+        known: problem and state that it begins at; jumped: over a jump.
+        """
         return ""
 
     def closed_pieces(self, v: Array) -> list[Any]:
@@ -201,18 +204,18 @@ class NonlinearNewton:
         """The state at a share of the load, from first; way: shares, the state at the lower."""
         share, goal, v = way
         known = problem.at_share(share), v
+        jumped = creeps or shown.wild
         if goal == 1.0:
             states = problem.states(first, known)
             found = self._newton(problem, states, target, linear, shown, creeps)
-            if creeps or shown.wild:
-                found = _not_astray(found, problem, v, target.tolerance)
-            yield from shown.best(found)
+            yield from shown.best(_not_astray(found, problem, known, target.tolerance, jumped))
         then = problem.at_share(goal)
         states = then.states(first, known)
         found = self._newton(then, states, target, linear, shown, creeps)
-        if creeps or shown.wild:
-            found = _not_astray(found, then, v, LOOSE)
-        return shown.reached(found, then, states.v(states.start))
+        arrived = shown.reached(found, then, states.v(states.start))
+        if why := then.astray(arrived, known, jumped):
+            raise Failed(why)
+        return arrived
 
     def _newton(
         self, problem: NonlinearProblem, states: States, target: Target, linear: LinearSteps,
@@ -283,12 +286,12 @@ class NonlinearNewton:
 
 
 def _not_astray(
-    steps: Iterator[tuple[Array, Array, float]], problem: NonlinearProblem, start: Array,
-    tolerance: float,
+    steps: Iterator[tuple[Array, Array, float]], problem: NonlinearProblem,
+    known: tuple[NonlinearProblem, Array], tolerance: float, jumped: bool,
 ) -> Iterator[tuple[Array, Array, float]]:  # fmt: skip
-    """The steps of a jump from a state; Failed where they end at one that none leads to."""
+    """Steps from a known state; Failed where they end at one that none leads to."""
     for v, r, size in steps:
-        if problem.error(r, v) <= tolerance and (why := problem.astray(v, start)):
+        if problem.error(r, v) <= tolerance and (why := problem.astray(v, known, jumped)):
             raise Failed(why)
         yield v, r, size
 
