@@ -136,19 +136,21 @@ def test_a_load_slides_on_a_lorry_that_brakes():
     lorry = am.RigidBodies([load], [FLOOR], mu=mu, gravity=lambda t: (a if t < T else 0, 0, -G))
     e = a - mu * G
     slid = run(lorry, 4e-3, 1.2)[-1].position[0, 0]
-    assert slid == pytest.approx(e * T**2 / 2 * (1 + e / (mu * G)), rel=5e-5)
+    assert slid == pytest.approx(e * T**2 / 2 * (1 + e / (mu * G)), rel=2e-5)
 
 
 def test_a_tablecloth_is_pulled_from_under_a_cup():
-    """The cup gets mu g, the cloth of M loses mu g (M + 2 m) / M."""
+    """The cup gets mu g, the cloth of M loses mu g (M + 2 m) / M.
+
+    Errors of solves opened corners by 1e-10: blocks tilted, which made 8e-5 of it.
+    """
     mu, v, M, m, t = 0.25, 3.0, 2.0, 1.0, 0.2
     cloth = am.RigidBody(am.cuboid((2, 1, 0.01)), M / 0.02, (0, 0, 0.005), velocity=(v, 0, 0))
     cup = am.RigidBody(am.cuboid((0.1, 0.1, 0.1)), m / 1e-3, (0, 0, 0.06))
     expected = v * t - mu * G * (M + 2 * m) / M * t**2 / 2, mu * G * t**2 / 2
-    missed = [abs(run(am.RigidBodies([cloth, cup], [FLOOR], mu=mu), h, t)[-1].position[:, 0]
-                  - expected).max() for h in (4e-3, 1e-3)]  # fmt: skip
-    assert missed[1] <= 2e-5
-    assert missed[1] <= missed[0] / 4
+    for h in (4e-3, 1e-3):
+        end = run(am.RigidBodies([cloth, cup], [FLOOR], mu=mu), h, t)[-1].position[:, 0]
+        np.testing.assert_allclose(end, expected, atol=1e-7)  # no corner drops out
 
 
 LENGTHS, GROUND_LENGTH, WIDE = (0.2, 0.6, 0.5), 0.55, 0.04  # crank, coupler, rocker
