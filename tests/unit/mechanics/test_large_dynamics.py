@@ -4,6 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from scipy.optimize import brentq
 
 import amontons as am
 from amontons.mechanics.elements.discrete_gradient import DiscreteBody
@@ -134,6 +135,40 @@ def test_stiff_blocks_leave_with_their_restitution(restitution):
     mean = (mass(mesh, law) @ step.state.velocity).reshape(-1, 2).sum(axis=0)[1]
     # the stress that is left gives back 1e-5 of the energy of the impact
     assert -1e-9 <= mean <= np.hypot(restitution, np.sqrt(1e-5))
+
+
+def test_rods_that_hit_each_other_press_as_a_shock_says():
+    """[P] = rho U^2 [F], v = U (1 - F) at a fifth of the speed of sound."""
+    c, v, n = np.sqrt(SOFT.young), 2.0, 6
+    law = am.NeoHookean(SOFT.young, 0.0, density=1.0)
+
+    def stress(F):  # P of one direction, as Poisson's ratio is 0
+        return law.young / 2 * (F - 1 / F)
+
+    F = brentq(lambda F: np.sqrt(stress(F) / (F - 1)) * (1 - F) - v, 0.3, 1 - 1e-9)
+    rods = [am.Body(am.box((1.0, 0.1), (cells, rows), origin=(x, 0.0)), law, name=name)
+            for name, x, cells, rows in (("a", 0.0, n, 1), ("b", 1.0, n + 3, 2))]  # fmt: skip
+    model = am.Model(rods, [], [am.Contact("a.right", master="b.left", mu=0.3)])
+    start = am.at_rest(model, velocity=[(v, 0.0), (-v, 0.0)])
+    method = am.MoreauJean(0.5 / n / c)
+    force = [abs(step.resultant()[0]) for step in
+             am.evolve(model, method, until=1.4 / c, start=start)]  # fmt: skip
+    late = force[len(force) // 5 :]  # what a mesh makes of a front has settled there
+    assert np.mean(late) == pytest.approx(-0.1 * stress(F), rel=5e-3)
+    assert -stress(F) > 1.05 * c * v
+
+
+@pytest.mark.parametrize("prediction", [0.5, 1.0])
+def test_an_impact_overlaps_by_no_more_than_is_said(prediction):
+    """h (2 - prediction - theta) |u_N|, reached by who is not quite predicted to touch."""
+    h = 0.01
+    mesh = am.box((1.0, 1.0), 1, origin=(0.0, (2 + prediction + 1e-3) * h))
+    model = am.Model([am.Body(mesh, am.NeoHookean(1e9, 0.0, density=1.0))], [],
+                     [am.Contact("bottom", am.Plane((0, 1)), mu=0.0)])  # fmt: skip
+    start = am.at_rest(model, velocity=(0.0, -1.0))
+    *_, step = am.evolve(model, am.MoreauJean(h, prediction=prediction), until=4 * h,
+                         start=start)  # fmt: skip
+    assert step.gap.min() == pytest.approx(-(1.5 - prediction) * h, abs=2e-3 * h)
 
 
 def test_small_motions_are_those_of_small_strains():

@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from scipy.integrate import quad
+from scipy.integrate import quad, solve_ivp
 
 import amontons as am
 
@@ -136,19 +136,21 @@ def test_a_load_slides_on_a_lorry_that_brakes():
     lorry = am.RigidBodies([load], [FLOOR], mu=mu, gravity=lambda t: (a if t < T else 0, 0, -G))
     e = a - mu * G
     slid = run(lorry, 4e-3, 1.2)[-1].position[0, 0]
-    assert slid == pytest.approx(e * T**2 / 2 * (1 + e / (mu * G)), rel=5e-5)
+    assert slid == pytest.approx(e * T**2 / 2 * (1 + e / (mu * G)), rel=2e-5)
 
 
 def test_a_tablecloth_is_pulled_from_under_a_cup():
-    """The cup gets mu g, the cloth of M loses mu g (M + 2 m) / M."""
+    """The cup gets mu g, the cloth of M loses mu g (M + 2 m) / M.
+
+    Errors of solves opened corners by 1e-10: blocks tilted, which made 8e-5 of it.
+    """
     mu, v, M, m, t = 0.25, 3.0, 2.0, 1.0, 0.2
     cloth = am.RigidBody(am.cuboid((2, 1, 0.01)), M / 0.02, (0, 0, 0.005), velocity=(v, 0, 0))
     cup = am.RigidBody(am.cuboid((0.1, 0.1, 0.1)), m / 1e-3, (0, 0, 0.06))
     expected = v * t - mu * G * (M + 2 * m) / M * t**2 / 2, mu * G * t**2 / 2
-    missed = [abs(run(am.RigidBodies([cloth, cup], [FLOOR], mu=mu), h, t)[-1].position[:, 0]
-                  - expected).max() for h in (4e-3, 1e-3)]  # fmt: skip
-    assert missed[1] <= 2e-5
-    assert missed[1] <= missed[0] / 4
+    for h in (4e-3, 1e-3):
+        end = run(am.RigidBodies([cloth, cup], [FLOOR], mu=mu), h, t)[-1].position[:, 0]
+        np.testing.assert_allclose(end, expected, atol=1e-7)  # no corner drops out
 
 
 LENGTHS, GROUND_LENGTH, WIDE = (0.2, 0.6, 0.5), 0.55, 0.04  # crank, coupler, rocker
@@ -238,8 +240,39 @@ def tippe_top(spin, tilt, d=0.004, radius=0.02, core=0.006, mu=0.1):
     return am.RigidBodies(bodies, [FLOOR], mu=mu, joints=joints, apart=[(0, 1)])
 
 
+def tippe_tilt(top, time):
+    """Angle of its axis after a time, by its own equations: one body on one sliding contact."""
+    (m, core), x = (body.mass for body in top.bodies), [body.position for body in top.bodies]
+    d, radius, M = np.linalg.norm(np.subtract(*x)), x[0][2], m + core
+    along = sum(body.inertia[0, 0] for body in top.bodies)
+    across = along + m * core / M * d**2
+    axis, up = np.subtract(*x) / d, np.array([0, 0, 1.0])
+
+    def omega(L, k):
+        return L / across + (1 / along - 1 / across) * (L @ k) * k
+
+    def rate(t, y):
+        v, k, L = y[:3], y[3:6], y[6:]
+        w, to_centre = omega(L, k), core / M * d * k
+        arm = to_centre - radius * up
+        slip = (v + np.cross(w, arm))[:2]
+        f = np.append(-top.mu * slip / np.linalg.norm(slip), 1.0)  # over the normal force
+        turned = np.cross(w, k)
+        gyration = (1 / along - 1 / across) * ((L @ turned) * k + (L @ k) * turned)
+        centre = np.cross(gyration, to_centre) + np.cross(w, np.cross(w, to_centre))
+        lift = f[2] / M + np.cross(omega(np.cross(arm, f), k), to_centre)[2]
+        normal = (G - centre[2]) / lift  # keeps the centre of the ball at its height
+        return np.concatenate([normal * f / M - G * up, turned, normal * np.cross(arm, f)])
+
+    y = np.concatenate([np.zeros(3), axis, along * np.array(top.bodies[0].spin)])
+    k = solve_ivp(rate, (0, time), y, rtol=1e-7, atol=1e-10).y[3:6, -1]
+    return np.arccos(k[2] / np.linalg.norm(k))
+
+
 def test_a_tippe_top_keeps_jelletts_integral():
     """The moment of momentum along the line from the centre of mass to the contact.
+
+    Its tilt is that of its equations.
 
     Joints of welds say three things twice: by chance their W_JJ^+ gave 1e7 instead of nothing.
     """
@@ -255,3 +288,6 @@ def test_a_tippe_top_keeps_jelletts_integral():
         assert np.linalg.norm(x[0] - x[1]) == pytest.approx(0.004, rel=1e-6)
         assert np.linalg.norm(step.spin, axis=1) == pytest.approx(298, rel=0.02)
     np.testing.assert_allclose(found, found[0], rtol=1e-3)
+    tilt = np.arccos((x[0] - x[1])[2] / 0.004)
+    assert tilt == pytest.approx(tippe_tilt(top, 0.06), abs=1e-4)
+    assert tilt < 0.47

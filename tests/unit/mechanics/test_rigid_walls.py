@@ -104,3 +104,16 @@ def test_relaxations_take_joints_and_bricks(searches, monkeypatch):
         assert np.median(missed) <= 5
         assert max(missed) <= 30
         assert all(s.solution.problem.error(s.solution.r) <= 1e-5 for s in solved)
+
+
+@pytest.mark.parametrize(("part", "tolerance"), [(0.5, 1e-4), (0.5, 1e-5), (0.9, 1e-4)])
+def test_corners_of_a_wall_do_not_drop_out(part, tolerance):
+    """Errors of solves opened 1e-10: 27 to 72 contacts in turn, ten times the work."""
+    steps = list(am.evolve_rigid(shaken(part), step=1e-3, until=0.06, tolerance=tolerance))
+    assert min(len(step.r) for step in steps) >= 64  # of 72, as it tips
+    assert all(isinstance(step._solved, Found) for step in steps)
+    assert sum(step._solved.sweeps for step in steps) < 2500
+    if part == 0.5:
+        assert abs(steps[-1].position - steps[0].position).max() == pytest.approx(
+            5.168e-4, rel=2e-3
+        )

@@ -24,7 +24,8 @@ Array = NDArray[np.float64]
 class Halfway:
     """Bodies in the middle of a step h: the motion before it, and `ends.middle_of` that.
 
-    state: with the last impulses, from which solves start.
+    state: with the last impulses, from which solves start; opened: gaps that count as none, and
+    up to which contacts are closed to them, u1_N >= -(gap - opened[0]) / h.
     """
 
     before: Motion
@@ -34,16 +35,21 @@ class Halfway:
     mobility: Mobility
     restitution: float
     state: RigidState
+    opened: tuple[float, float]
 
     def posed(self, at: Met) -> Posed:
         """The problem of contacts, and of joints with u1 = 0."""
         _, _, R, spun = self.middle
         v, last = self.before.velocity, (self.state.keys, self.state.impulses)
         free = v + self.h * self.gravity, spun
-        return Posed(*pose(
+        posed = Posed(*pose(
             at.rows, len(at.keys), (*self.mobility, R), (v, spun), free, self.restitution,
             at.keys, last,
         ))  # fmt: skip
+        none, most = self.opened
+        if most > none and at.hung is None:  # joints do not let the others be closed
+            posed.q[: len(at.keys), 0] += (at.found.gaps.clip(none, most) - none) / self.h
+        return posed
 
     def still(self, joints: Joints, at: Met) -> tuple[Posed, Array]:
         """The problem of joints that keep still, u1 = 0, and what c (k, 3) that is."""

@@ -37,6 +37,12 @@ something back: u1 = 0 then, which bodies at rest always have.  What joints deci
 no contact, and where they decide the normal alone it is one for the sake of its friction.
 Overlaps of both kinds are left: mending them would contradict the joints.
 
+A solve may open contacts by h `left`, its tolerance of the velocities q at its contacts
+(`leaves`), for each of two bodies.  Such gaps count as none.  Those that errors of some more
+solves may have opened are closed to that again.  Else corners of a wall would drop out at
+random, and each step be another problem, with blocks on three corners, or on two; closed to
+nothing they would follow every error, another problem again.
+
 Turning lifts a contact by the square of its angle in a step, where it takes no part until loads
 have brought it down again.  One that loses its load at a constant rate stays up for ever when
 that takes longer than the load is left, from a time of order sqrt(h) before it.
@@ -85,7 +91,7 @@ from .rows import (
     to_global,
     to_own,
 )
-from .solving import Solved, Solving
+from .solving import Solved, Solving, leaves
 from .states import (
     Motion,
     RigidEnergies,
@@ -103,6 +109,7 @@ OVERLAP = 1e-5  # of the smallest body, below which overlaps are left
 MENDED = 1e-6  # error of a mending that is let pass: what it leaves is mended in the next step
 FAR = 1e-3  # of the smallest body, moved by mending, from which contacts are found again
 TOUCHING = 1e-9  # of a body, gaps up to which it touches
+LEFT = 5.0  # solves whose errors may have opened a contact, but by `overlap` at most
 NOTHING = np.zeros((0, 3))
 
 
@@ -186,7 +193,7 @@ class _Stepping:
         self.inverse: Array = np.linalg.inv(inertia)
         self.bodies = masses, inertia, self.inverse
         self.no_couples = np.zeros((len(masses), 3))
-        self.near = TOUCHING * system.packed.reach
+        self.near: Array = TOUCHING * system.packed.reach
         guides = Guides.of(system.packed.planes[:, :3])
         self.solving = Solving(system.mu, guides, asked, solver, check)
         self.joints = Joints(system, self.bodies) if len(system.joints) else None
@@ -197,6 +204,8 @@ class _Stepping:
         """One step from a state to a time."""
         h, before = self.h, state.motion
         gravity = np.array(self.system.gravity_at(time - 0.5 * h))
+        opened = min(LEFT * h * state.left, 0.5 * self.overlap)  # of each of two bodies
+        self.near = TOUCHING * self.system.packed.reach + opened
         jolt, sides, (lost, taken) = NOTHING, NOTHING, (0.0, 0.0)
         if self.joints is not None:
             before, jolt, sides, (lost, taken) = self.joints.kept(before)
@@ -216,7 +225,8 @@ class _Stepping:
             else:
                 at = self._closed(at, gaps)
         mobility = masses, global_inverse(middle[2], self.inverse)
-        half = Halfway(before, middle, h, gravity, mobility, self.system.restitution, state)
+        half = Halfway(before, middle, h, gravity, mobility, self.system.restitution, state,
+                       (2.0 * opened / LEFT, 2.0 * opened))  # fmt: skip
         solved, r, moments, turn = None, NOTHING, NOTHING, self.no_couples
         worked, nc = 0.0, len(at.keys)
         if len(at.rows.slave):
@@ -242,7 +252,8 @@ class _Stepping:
             fallen = 0.5 * float(masses.sum() * (h * gravity) @ (h * gravity))
             busy = self.joints.energy(end)
             loss = state.loss_after(done.joints, busy, fallen, self.asked.tolerance)
-        new = RigidState(state.index + 1, time, end, at.keys, r[:nc], moments, *loss, end)
+        left = 0.0 if solved is None else leaves(solved, self.asked.tolerance)
+        new = RigidState(state.index + 1, time, end, at.keys, r[:nc], moments, *loss, left, end)
         said = self._said_of(state, new) + self._undetermined(at)
         return RigidStep(self.system, new, at.found, at.rows.axes[:nc], r[:nc], r[nc:] + jolt,
                          done, solved, said)  # fmt: skip

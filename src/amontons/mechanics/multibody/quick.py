@@ -30,7 +30,13 @@ from ...problem.law import Coulomb, Law, Tied, joined
 from ...problem.law.law import COULOMB, TIED
 from ...problem.settling import Settled
 from ...problem.solution import Convergence, FrictionSolution, Outcome, Step
-from ...solvers.sweeps.kernels import EXACT, FIRST_JUDGED, Sweep, sweeps_inplace
+from ...solvers.sweeps.kernels import (
+    EXACT,
+    FIRST_JUDGED,
+    Sweep,
+    sweep_inplace,
+    sweeps_inplace,
+)
 from ...solvers.sweeps.local_contact import CLOSE
 from ...solvers.sweeps.on_bodies import momentum_on_bodies_inplace
 from .rows import coupled, fill_blocks, row_velocities, to_global
@@ -235,12 +241,18 @@ def solved(  # noqa: PLR0913
     at_rest = natural_error(*problem, np.zeros((n, 3)))
     if at_rest < error:
         r[:, :], error = 0.0, at_rest
-    if not error <= goal:
+    s = Sweep(
+        indptr, indices, data, data, q, kind, parameters, rho, diagonal, eliminated,
+        np.arange(n), EXACT, 1.0, CLOSE, 0, np.zeros(1),
+    )  # fmt: skip
+    if error <= goal and sweeps + more > 0:  # errors of one sign, step after step, add up
+        kept[:, :] = r
+        sweep_inplace(s, False, r)
+        done += 1
+        if not natural_error(*problem, r) < error:
+            r[:, :] = kept
+    elif not error <= goal:
         watch = np.array([goal, FIRST_JUDGED * goal, math.inf])
-        s = Sweep(
-            indptr, indices, data, data, q, kind, parameters, rho, diagonal, eliminated,
-            np.arange(n), EXACT, 1.0, CLOSE, 0, np.zeros(1),
-        )  # fmt: skip
         done = sweeps_inplace(s, r, sweeps, watch)
         if not watch[2] <= goal and more > 0:
             watch[1] = FIRST_JUDGED * goal

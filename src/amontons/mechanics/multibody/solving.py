@@ -101,6 +101,12 @@ class Solving:
         return least_squeezed(at.rows, mobility, posed, nc, mu, self.asked.tolerance)
 
 
+def leaves(solved: Solved, tolerance: float) -> float:
+    """The error in velocity that a tolerance allows, all of which one contact may have."""
+    q = solved.posed.q if isinstance(solved, Found) else np.asarray(solved.problem.q)[:, :3]
+    return tolerance * float(np.linalg.norm(q))
+
+
 def _timed(deadline: Deadline) -> bool:
     """True where work is counted, or time is over."""
     return deadline is not NEVER and (deadline.work is not None or deadline.passed)

@@ -54,6 +54,7 @@ class RigidState:
     lost: float = 0.0  # energy that joints took without a jolt, an error of the steps
     most: float = 0.0  # largest of |lost| so far
     fastest: float = 0.0  # largest energy of `Joints` so far, or what gravity gives in a step
+    left: float = 0.0  # velocity that the last solve may have left at a contact, see `leaves`
     reached: Motion | None = field(default=None, repr=False)  # by a step; others are jolted
 
     def loss_after(

@@ -31,7 +31,9 @@ Contacts that give way have the law of the end of the step, see `springs`, and n
 M_hat does not change, and its W falls apart into the bodies: it is formed once, and every step
 cuts the active contacts out of it.
 
-Left out: corrections of the penetration that an impact leaves, h (1 - theta) |u_N| at most.
+Left out: corrections of the penetration that an impact leaves, at most
+h (2 - prediction - theta) |u_N|: of a step that is not predicted to touch, 1 - prediction, and
+of the next, which stops it, 1 - theta.
 
 [AB] V. Acary, B. Brogliato, "Numerical methods for nonsmooth dynamical systems", Springer 2008.
 [J] M. Jean, "The non smooth contact dynamics method", CMAME 177 (1999).
