@@ -102,7 +102,7 @@ class ContactMultigrid:
     update_ratio: float = 0.01
     contact_sweeps: int = 1  # over the contact nodes after each sweep in the bulk
     patience: int = 30  # cycles without halving the error before it gives up
-    report: int = 20  # cycles between iterates that are not yet good enough
+    report: int = 10  # cycles between iterates that are not yet good enough
 
     def __post_init__(self) -> None:
         check_options(self)
