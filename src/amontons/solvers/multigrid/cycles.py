@@ -96,7 +96,7 @@ class ContactMultigrid:
 
     form: ClassVar[Form] = Form.GLOBAL
     matrix_free: ClassVar[bool] = True  # M may be an operator
-    depth: int = 6
+    depth: int = 8
     nested: bool = True
     coarse_tolerance: float = 1e-2
     update_ratio: float = 0.01
