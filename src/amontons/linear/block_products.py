@@ -22,7 +22,7 @@ FOUR = ir.VectorType(DOUBLE, LANES)
 THREE_OF_THEM = ir.Constant(ir.VectorType(ir.IntType(1), LANES), [1, 1, 1, 0])
 FIRST = ir.Constant(ir.VectorType(INT, LANES), [0] * LANES)
 NOTHING = ir.Constant(FOUR, [0.0] * LANES)
-ONE, THREE, NINE = (ir.Constant(LONG, count) for count in (1, 3, 9))
+ONE, THREE, NINE, WHOLE = (ir.Constant(LONG, count) for count in (1, 3, 9, LANES))
 place = types.uint64
 
 
@@ -63,6 +63,77 @@ def _at(builder: Any, indices: Any, k: Any, size: Any) -> Any:
     return builder.mul(builder.zext(builder.load(builder.gep(indices, [k])), LONG), size)
 
 
+def _emit_sum_back(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
+    """The loop of `product_of_blocks_back`, and the sums of its lanes."""
+    data, indices, r = _pointers(context, builder, signature.args[:3], arguments[:3])
+    first, last = arguments[3:]
+    sums = [cgutils.alloca_once_value(builder, NOTHING) for _ in range(3)]
+    end = builder.sub(builder.add(first, last), ONE)
+    with cgutils.for_range_slice(builder, first, last, ONE, intp=LONG) as (step, _):
+        _add_block(builder, data, indices, r, builder.sub(end, step), sums)
+    return _sums_of_lanes(context, builder, signature, sums)
+
+
+def _add_block(builder: Any, data: Any, indices: Any, r: Any, k: Any, sums: Any) -> None:
+    """sums += rows of data_k times r_j, j = indices_k, lane by lane."""
+    x, block = _row(builder, r, _at(builder, indices, k, THREE)), builder.mul(k, NINE)
+    for a, total in enumerate(sums):
+        row = _row(builder, data, block, a)
+        builder.store(_added(builder, row, x, builder.load(total)), total)
+
+
+def _sums_of_lanes(context: Any, builder: Any, signature: Any, sums: Any) -> Any:
+    found = []
+    for total in sums:
+        x, y, z = _lanes(builder, builder.load(total))
+        found.append(builder.fadd(builder.fadd(x, y), z))
+    return context.make_tuple(builder, signature.return_type, found)
+
+
+def _everywhere(builder: Any, number: Any) -> Any:
+    """A number in all lanes."""
+    lane = builder.insert_element(NOTHING, number, ir.Constant(INT, 0))
+    return builder.shuffle_vector(lane, NOTHING, FIRST)
+
+
+def _emit_spread(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
+    """The loop of `spread_blocks_inplace`; the empty lane gets nothing."""
+    data, indices, out = _pointers(context, builder, signature.args[:3], arguments[:3])
+    first, last, *x = arguments[3:]
+    x = [_everywhere(builder, number) for number in x]
+    with cgutils.for_range_slice(builder, first, last, ONE, intp=LONG) as (k, _):
+        target = builder.gep(out, [_at(builder, indices, k, WHOLE)])
+        here, block = builder.bitcast(target, FOUR.as_pointer()), builder.mul(k, NINE)
+        total = builder.load(here, align=BYTES)
+        for a in range(3):
+            total = _added(builder, _row(builder, data, block, a), x[a], total)
+        builder.store(total, here, align=BYTES)
+    return context.get_dummy_value()
+
+
+def _emit_add(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
+    """`add_block_inplace`: nine numbers, twice four and one."""
+    out, t, weight, blocks, k = arguments
+    kinds = signature.args[0], signature.args[3]
+    begins = _pointers(context, builder, kinds, (out, blocks))
+    begins = [
+        builder.gep(array, [builder.mul(number, NINE)])
+        for array, number in zip(begins, (t, k), strict=True)
+    ]
+    lanes = _everywhere(builder, weight)
+    for n in (0, LANES):
+        target, given = (
+            builder.bitcast(builder.gep(array, [ir.Constant(LONG, n)]), FOUR.as_pointer())
+            for array in begins
+        )
+        total, numbers = (builder.load(at, align=BYTES) for at in (target, given))
+        builder.store(_added(builder, lanes, numbers, total), target, align=BYTES)
+    target, given = (builder.gep(array, [ir.Constant(LONG, 2 * LANES)]) for array in begins)
+    product = builder.fmul(weight, builder.load(given))
+    builder.store(builder.fadd(builder.load(target), product), target)
+    return context.get_dummy_value()
+
+
 def _emit_sum(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
     """The loop of `product_of_blocks`, and the sums of its lanes."""
     data, indices, r = _pointers(context, builder, signature.args[:3], arguments[:3])
@@ -70,15 +141,8 @@ def _emit_sum(context: Any, builder: Any, signature: Any, arguments: Any) -> Any
     sums = [cgutils.alloca_once_value(builder, NOTHING) for _ in range(3)]
     for begin, end in ((first, without), (builder.add(without, ONE), last)):
         with cgutils.for_range_slice(builder, begin, end, ONE, intp=LONG) as (k, _):
-            x, block = _row(builder, r, _at(builder, indices, k, THREE)), builder.mul(k, NINE)
-            for a, total in enumerate(sums):
-                row = _row(builder, data, block, a)
-                builder.store(_added(builder, row, x, builder.load(total)), total)
-    found = []
-    for total in sums:
-        x, y, z = _lanes(builder, builder.load(total))
-        found.append(builder.fadd(builder.fadd(x, y), z))
-    return context.make_tuple(builder, signature.return_type, found)
+            _add_block(builder, data, indices, r, k, sums)
+    return _sums_of_lanes(context, builder, signature, sums)
 
 
 def _emit_rows(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
@@ -88,8 +152,7 @@ def _emit_rows(context: Any, builder: Any, signature: Any, arguments: Any) -> An
     minus, own = [], builder.mul(l, NINE)
     for n in range(9):
         number = builder.load(builder.gep(L, [builder.add(own, ir.Constant(LONG, n))]))
-        lane = builder.insert_element(NOTHING, builder.fneg(number), ir.Constant(INT, 0))
-        minus.append(builder.shuffle_vector(lane, NOTHING, FIRST))
+        minus.append(_everywhere(builder, builder.fneg(number)))
     with cgutils.for_range_slice(builder, first, last, ONE, intp=LONG) as (j, _):
         block, target = builder.mul(j, NINE), _at(builder, columns, j, NINE)
         rows = [_row(builder, U, block, b) for b in range(3)]
@@ -113,6 +176,24 @@ def _product_of_blocks(typing, data, indices, r, first, last, without):  # noqa:
     return returned(data, indices, r, place, place, place), _emit_sum
 
 
+def _product_of_blocks_back(typing, data, indices, r, first, last):  # noqa: ARG001, PLR0913
+    """The same from the last block to the first, with none left out."""
+    returned = types.UniTuple(types.float64, 3)
+    return returned(data, indices, r, place, place), _emit_sum_back
+
+
+def _spread_blocks_inplace(typing, data, indices, out, first, last, x0, x1, x2):  # noqa: ARG001, PLR0913
+    """out_j += data_k^T (x0, x1, x2), j = indices_k, for first <= k < last; out (., 4)."""
+    number = types.float64
+    given = data, indices, out, place, place, number, number, number
+    return types.void(*given), _emit_spread
+
+
+def _add_block_inplace(typing, out, t, weight, blocks, k):  # noqa: ARG001, PLR0913
+    """out_t += weight blocks_k, both (., 3, 3)."""
+    return types.void(out, place, types.float64, blocks, place), _emit_add
+
+
 def _subtract_products_inplace(typing, work, columns, U, L, l, first, last):  # noqa: ARG001, PLR0913
     """work_t -= L_l U_j, t = columns_j, for first <= j < last; blocks (., 3, 3), contiguous."""
     return types.void(work, columns, U, L, place, place, place), _emit_rows
@@ -123,16 +204,40 @@ def _product_in_python(data, indices, r, first, last, without):  # noqa: PLR0913
     return tuple(sum((data[k] @ r[indices[k]] for k in blocks), np.zeros(3)))
 
 
+def _product_back_in_python(data, indices, r, first, last):
+    return _product_in_python(data, indices, r, first, last, last)
+
+
+def _spread_in_python(data, indices, out, first, last, *x):  # noqa: PLR0913
+    for k in range(int(first), int(last)):
+        out[indices[k], :3] += data[k].T @ x
+
+
+def _add_in_python(out, t, weight, blocks, k):  # noqa: PLR0913
+    out[t] += weight * blocks[k]
+
+
 def _subtract_in_python(work, columns, U, L, l, first, last):  # noqa: PLR0913
     for j in range(int(first), int(last)):
         work[columns[j]] -= L[l] @ U[j]
 
 
+add_block_inplace: Any
 product_of_blocks: Any
+product_of_blocks_back: Any
+spread_blocks_inplace: Any
 subtract_products_inplace: Any
 if config.DISABLE_JIT:
-    product_of_blocks, subtract_products_inplace = _product_in_python, _subtract_in_python
+    add_block_inplace = _add_in_python
+    product_of_blocks, product_of_blocks_back = _product_in_python, _product_back_in_python
+    spread_blocks_inplace, subtract_products_inplace = _spread_in_python, _subtract_in_python
 else:
+    add_block_inplace = intrinsic(_add_block_inplace)
     product_of_blocks = intrinsic(_product_of_blocks)
+    product_of_blocks_back = intrinsic(_product_of_blocks_back)
+    spread_blocks_inplace = intrinsic(_spread_blocks_inplace)
     subtract_products_inplace = intrinsic(_subtract_products_inplace)
-__all__ = ["product_of_blocks", "subtract_products_inplace"]
+__all__ = [
+    "add_block_inplace", "product_of_blocks", "product_of_blocks_back",
+    "spread_blocks_inplace", "subtract_products_inplace",
+]  # fmt: skip

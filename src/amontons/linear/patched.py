@@ -16,23 +16,27 @@ from numpy.typing import NDArray
 from ..core.compiled import njit
 from ..core.threads import over_rows, over_stages
 from .grid import GridBlocks
+from .halves import Halves, Sums
 from .level_matrix import LevelMatrix
 from .node_blocks import NodeBlocks, row_product, row_product_back
 from .some_rows import Pattern, relax
 
 Array = NDArray[np.float64]
 Index = NDArray[np.int64]
+WORTH = 10_000  # blocks of the rows of others from which they are swept in halves
 
 
 @dataclass(frozen=True, eq=False)
 class Rows(Pattern):
     """Some rows of a matrix, nodes ascending, and slots (e,): their entries in its data.
 
-    number (nodes,): place of a node among them, -1 for others.
+    number (nodes,): place of a node among them, -1 for others; halves: the others, where these
+    are the first and many.
     """
 
     number: NDArray[np.int32]
     slots: Index
+    halves: Halves | None = None
     _known: list[NodeBlocks] = field(default_factory=list)
 
     @classmethod
@@ -41,7 +45,11 @@ class Rows(Pattern):
         number = np.full(A.nodes, -1, dtype=np.int32)
         number[node] = np.arange(len(node))
         slots, ends = A.slots(node)
-        return cls(node, ends.astype(np.int32), A.indices[slots], number, slots)
+        first = A.nodes - len(node)
+        first = first if len(node) and node[0] == first else 0
+        many = A.indptr[first] >= WORTH
+        halves = Halves.of(A, A.leading(first)) if many else None
+        return cls(node, ends.astype(np.int32), A.indices[slots], number, slots, halves)
 
     def of_operator(self, A: LevelMatrix) -> NodeBlocks:
         """These rows of the matrix A that they are of, not stored; made once."""
@@ -84,10 +92,13 @@ class PatchedBlocks:
     def smooth(self, b: Array, x: Array, held: NDArray[np.bool_], backward: bool) -> None:
         """A block Gauss-Seidel sweep on A x = b over the nodes that are not held."""
         if self._first is not None:
-            own = self.data, self.inverse, b, x, held, backward
+            own, halves = (self.data, self.inverse, b, x, held, backward), self.rows.halves
             if backward:
                 self.rows.sweep(*own)
-            self._first.smooth(b, x, held, backward)
+            if halves is not None and backward and not held.any():
+                halves.backward(b, x, self._sums)
+            else:
+                self._first.smooth(b, x, held, backward)
             if not backward:
                 self.rows.sweep(*own)
             return
@@ -97,8 +108,22 @@ class PatchedBlocks:
     def first_smooth(self, b: Array, x: Array, r: Array) -> None:
         """A forward sweep from x = 0, and r = b - A x."""
         x[:] = 0.0
-        self.smooth(b, x, np.zeros(self.nodes, dtype=bool), False)
-        self.residual(x, b, r)
+        free, halves = np.zeros(self.nodes, dtype=bool), self.rows.halves
+        if halves is None:
+            self.smooth(b, x, free, False)
+            self.residual(x, b, r)
+            return
+        self._sums.clear()
+        first = r[: halves.count]
+        halves.forward(b, x, self._sums, first)
+        self.rows.sweep(self.data, self.inverse, b, x, free, False)
+        halves.leave(x, first, self._sums, first)
+        self.rows.evaluate(self.data, x, b, r)
+
+    @cached_property
+    def _sums(self) -> Sums:
+        assert self.rows.halves is not None
+        return self.rows.halves.sums()
 
     def residual(self, x: Array, b: Array, out: Array) -> None:
         """out = b - A x."""

@@ -11,9 +11,9 @@ from numpy.typing import NDArray
 
 from ..core.compiled import njit
 from ..core.threads import Range, over_rows, over_stages
+from .block_products import product_of_blocks, product_of_blocks_back
 from .chunks import chunks_among
 from .level_matrix import LevelMatrix
-from .node_blocks import row_product, row_product_back
 
 Array = NDArray[np.float64]
 Index = NDArray[np.int64]
@@ -93,9 +93,9 @@ def sweep_rows(begin, end, node, indptr, indices, data, inverse, b, x, held, bac
         if not held[i]:
             first, last = uint64(indptr[k]), uint64(indptr[k + 1])
             if backward:
-                s = row_product_back(indices, data, x, first, last)
+                s = product_of_blocks_back(data, indices, x, first, last)
             else:
-                s = row_product(indices, data, x, first, last)
+                s = product_of_blocks(data, indices, x, first, last, last)
             relax(inverse[k], b, s, x, i)
 
 
@@ -104,5 +104,6 @@ def residual_rows(begin, end, node, indptr, indices, data, x, b, r):  # noqa: PL
     """r = b - A x in some rows."""
     for k in range(begin, end):
         i = uint64(node[k])
-        s = row_product(indices, data, x, uint64(indptr[k]), uint64(indptr[k + 1]))
+        first, last = uint64(indptr[k]), uint64(indptr[k + 1])
+        s = product_of_blocks(data, indices, x, first, last, last)
         r[i, 0], r[i, 1], r[i, 2] = b[i, 0] - s[0], b[i, 1] - s[1], b[i, 2] - s[2]

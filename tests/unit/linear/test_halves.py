@@ -37,18 +37,20 @@ def test_back_and_forth_as_with_whole_rows(cut, monkeypatch):
     first = A.leading(FIRST)
     assert (len(first.chunks) > 2) == cut
     halves = Halves.of(A, first)
+    assert halves is not None
     rng = np.random.default_rng(1)
-    b, x, left = (rng.standard_normal((N, 3)) for _ in range(3))
-    wanted, held, left = x.copy(), np.zeros(N, dtype=bool), left[:FIRST]
-    halves.backward(b, x, left)
+    b, x = (rng.standard_normal((N, 3)) for _ in range(2))
+    wanted, held, left = x.copy(), np.zeros(N, dtype=bool), np.empty((FIRST, 3))
+    sums = halves.sums()
+    halves.backward(b, x, sums)
     first.smooth(b, wanted, held, True)
     np.testing.assert_allclose(x, wanted, rtol=0, atol=1e-13)
-    halves.forward(b, x, left)
+    halves.forward(b, x, sums, left)
     first.smooth(b, wanted, held, False)
     np.testing.assert_allclose(x, wanted, rtol=0, atol=1e-13)
     x[FIRST:] = wanted[FIRST:] = rng.standard_normal((N - FIRST, 3))  # by somebody else
     residual, whole = np.zeros((N, 3)), np.zeros((N, 3))
-    halves.subtract_after(x, left, residual[:FIRST])
+    halves.leave(x, left, sums, residual[:FIRST])
     A.residual(wanted, b, whole)
     np.testing.assert_allclose(residual[:FIRST], whole[:FIRST], rtol=0, atol=1e-11)
     halves.residual(x, b, residual)
@@ -61,11 +63,24 @@ def test_back_and_forth_as_with_whole_rows(cut, monkeypatch):
 def test_a_sweep_over_all_rows(backward):
     A = matrix()
     halves = Halves.of(A, A.leading(FIRST))
+    assert halves is not None
     b = np.random.default_rng(2).standard_normal((N, 3))
     x, wanted, held = np.zeros((N, 3)), np.zeros((N, 3)), np.zeros(N, dtype=bool)
     halves.smooth(b, x, held, backward)
     A.smooth(b, wanted, held, backward)
     np.testing.assert_allclose(x, wanted, rtol=0, atol=1e-13)
+
+
+@pytest.mark.parametrize("kind", ["not symmetric", "at rest"])
+def test_one_half_is_not_the_whole_of_every_matrix(kind):
+    A = matrix()
+    own = A.diagonal()[7]
+    if kind == "at rest":
+        A.data[own, 2], A.data[own, :, 2] = 0.0, 0.0
+    else:
+        A.data[own + 1, 0, 1] += 1.0
+    A = NodeBlocks.of(A.indptr, A.indices, A.data)
+    assert Halves.of(A, A.leading(FIRST)) is None
 
 
 @pytest.mark.parametrize("kind", ["regular", "at rest", "singular"])

@@ -6,9 +6,9 @@ One cycle, from v on the finest level:
    contact and friction exactly (`nodes`), once before and once after the nodes that it touches
    have been swept again.  In one-sided bases these couple strongly with the contacts, and so
    does the master side: without that sweep cycles doubled with every refinement.  Where their
-   rows hold LITTLE of the residual, the first of the two solves is left out.  Of two bodies
-   these nodes and contacts have the last numbers; the sweep over the others continues the one
-   of the cycle before (`linear.halves`).
+   rows hold LITTLE of the residual, contacts are solved once, behind the sweep over all nodes.
+   Of two bodies these nodes and contacts have the last numbers; the sweep over the others
+   continues the one of the cycle before (`linear.halves`).
 2. mix: of this point and the last ones, the one with the least residual (`least_residual`);
    contacts solve again unless none has changed its state, and states, reactions and residual
    are of this v.
@@ -77,7 +77,7 @@ MANY = 0.1  # share of contacts that change their state above which mixing begin
 GROWTH = 1e3  # of the error over the best one that counts as divergence
 LATE = 30  # cycles after which steps are mixed: residuals hide slow errors in soft parts
 LONG = 24  # steps to mix then
-FEW = 0.01  # share of the closed contacts up to which changed states leave the tangent as it is
+FEW = 0.1  # share of the closed contacts up to which changed states leave the tangent as it is
 GRID_DEPTH = 2  # past cycles to mix at most where M is not stored
 STALE = 0.5  # fall of the error in a cycle above which any changed state renews the tangent
 SLOW = 0.8  # fall of the error in a cycle above which, while states change, steps are limited
@@ -201,8 +201,10 @@ class _Run:
         self.levels, self.tangent, self.options, self.k = levels, tangent, options, k
         self.contacts, self.f, self.load, self.length = given
         self.level = levels.hierarchy.levels[k]
-        self.left = np.empty((self.contacts.others or 0, 3))  # of the load, see `halves`
-        self.known = False  # is that of x?
+        A = self.level.A
+        self.sums = A.sums() if isinstance(A, Halves) else None
+        self.left = np.empty((self.contacts.others or 0, 3))  # of these, see `halves`
+        self.known = False  # are they of x?
         self.held = np.zeros(self.level.A.nodes, dtype=bool)
         self.held[self.contacts.node] = True
         self.kind = self.held.astype(np.int8)
@@ -279,14 +281,14 @@ class _Run:
         A, contacts = self.level.A, self.contacts
         if backward and contacts.others is not None:
             contacts.near.smooth(self.f, x, self.held, backward)
-        if not isinstance(A, Halves):
+        if not isinstance(A, Halves) or self.sums is None:
             (contacts.bulk or A).smooth(self.f, x, self.held, backward)
         elif backward:
-            A.backward(self.f, x, self.left)
+            A.backward(self.f, x, self.sums)
         else:
             if not self.known:
-                A.subtract_after(x, self.f, self.left)
-            A.forward(self.f, x, self.left)
+                A.sum(x, self.sums)
+            A.forward(self.f, x, self.sums, self.left)
         if contacts.others is not None and not backward:
             contacts.near.smooth(self.f, x, self.held, backward)
         self.known = backward
@@ -294,8 +296,8 @@ class _Run:
     def evaluate(self, x: Array) -> None:
         """The residual after a forward sweep and the visits of contacts."""
         A = self.level.A
-        if isinstance(A, Halves):
-            A.subtract_after(x, self.left, self.r[: A.count])
+        if isinstance(A, Halves) and self.sums is not None:
+            A.leave(x, self.left, self.sums, self.r[: A.count])
             self.contacts.residual(self.f, x, self.r)
         else:
             A.residual(x, self.f, self.r)

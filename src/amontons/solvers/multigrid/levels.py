@@ -130,8 +130,10 @@ def _prepare(problem: FrictionProblem) -> ContactLevels:
     truncation = Truncation(hierarchy, touched)
     if basis.coupling is not None and contacts.bulk is not None and len(hierarchy.levels) > 1:
         assert isinstance(A, NodeBlocks)  # nobody else has these
-        hierarchy.levels[0] = hierarchy.levels[0].of(Halves.of(A, contacts.bulk))
-        contacts.bulk = None
+        halves = Halves.of(A, contacts.bulk)
+        if halves is not None:
+            hierarchy.levels[0] = hierarchy.levels[0].of(halves)
+            contacts.bulk = None
     return ContactLevels(basis, hierarchy.nodes, hierarchy, contacts, coarse, truncation)
 
 

@@ -155,11 +155,11 @@ class ContactNodes:
         held (nodes,): the contact nodes.  What the first sweep leaves there would be all that
         the next level sees of the bulk: most of the residual where such rows are strongly
         coupled, as those of the nodes of a master surface are in the one-sided basis.
-        once: without the first sweep.
+        once: one sweep over the contacts and no other.
         """
         if not once:
             self.sweep(f, x, backward)
-        self.near.smooth(f, x, held, backward)
+            self.near.smooth(f, x, held, backward)
         self.sweep(f, x, backward)
 
     def residual(self, f: Array, x: Array, out: Array) -> None:

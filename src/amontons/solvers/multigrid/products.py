@@ -13,6 +13,7 @@ from numba import uint64
 from numpy.typing import NDArray
 
 from ...core.compiled import njit
+from ...linear.block_products import add_block_inplace
 from ...linear.node_blocks import NodeBlocks
 from ...linear.transfer import Transfer
 from ..contract import Breakdown
@@ -158,30 +159,16 @@ def _noted(t, marks, found, count):
 
 @njit(cache=True, error_model="numpy")
 def _spread(p_ptr, weights, node, first, place, chosen, blocks, out, marks, found):  # noqa: PLR0913
-    """Add the chosen blocks, each times the weights of its node, at their places in out.
-
-    A block is read once, in nine numbers: as an array it would be read anew after every write.
-    """
+    """Add the chosen blocks, each times the weights of its node, at their places in out."""
     count = 0
     for c in range(len(chosen)):
         e = uint64(chosen[c])
-        i, at, B = uint64(node[e]), uint64(first[e]), blocks[e]
-        b00, b01, b02 = B[0, 0], B[0, 1], B[0, 2]
-        b10, b11, b12 = B[1, 0], B[1, 1], B[1, 2]
-        b20, b21, b22 = B[2, 0], B[2, 1], B[2, 2]
+        i, at = uint64(node[e]), uint64(first[e])
         for b in range(uint64(p_ptr[i]), uint64(p_ptr[i + uint64(1)])):
-            w, t = weights[b], uint64(place[at])
+            t = uint64(place[at])
             at += uint64(1)
             count = _noted(t, marks, found, count)
-            out[t, 0, 0] += w * b00
-            out[t, 0, 1] += w * b01
-            out[t, 0, 2] += w * b02
-            out[t, 1, 0] += w * b10
-            out[t, 1, 1] += w * b11
-            out[t, 1, 2] += w * b12
-            out[t, 2, 0] += w * b20
-            out[t, 2, 1] += w * b21
-            out[t, 2, 2] += w * b22
+            add_block_inplace(out, t, weights[b], blocks, e)
     return count
 
 
@@ -199,7 +186,7 @@ def _transposed(B):
 
 @njit(cache=True, error_model="numpy", inline="always")
 def _add_product(a, b, out, t):
-    """out[t] += a b, each given as nine numbers, for the same reason as in `_spread`."""
+    """out[t] += a b, each nine numbers: an array would be read anew after every write."""
     a0, a1, a2, a3, a4, a5, a6, a7, a8 = a
     b0, b1, b2, b3, b4, b5, b6, b7, b8 = b
     out[t, 0, 0] += a0 * b0 + a1 * b3 + a2 * b6

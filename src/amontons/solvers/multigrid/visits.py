@@ -6,7 +6,7 @@ import numpy as np
 from numba import uint64
 
 from ...core.compiled import njit
-from ...linear.node_blocks import row_product, row_product_back
+from ...linear.block_products import product_of_blocks, product_of_blocks_back
 from ...problem.law.law import BOUND, TRESCA
 from ...problem.law.single import solve_contact
 from ...problem.law.states import OPEN, SLIP, STICK
@@ -24,9 +24,9 @@ def sweep_contacts(begin, end, indptr, indices, data, node, H, inverse, complian
         p = node[c]
         first, last = uint64(indptr[c]), uint64(indptr[c + 1])
         if backward:
-            s0, s1, s2 = row_product_back(indices, data, x, first, last)
+            s0, s1, s2 = product_of_blocks_back(data, indices, x, first, last)
         else:
-            s0, s1, s2 = row_product(indices, data, x, first, last)
+            s0, s1, s2 = product_of_blocks(data, indices, x, first, last, last)
         g0, g1, g2 = f[p, 0] - s0, f[p, 1] - s1, f[p, 2] - s2
         for i in range(3):
             y[i] = x[p, i] + (
