@@ -171,7 +171,7 @@ class _Search:
             return False
         if not found.converged or found.v is None or self._is_known(found.v):
             return False
-        if problem.astray(found.v, self._state(0)):  # no body gets there
+        if problem.astray(found.v, (problem, self._state(0))):  # no body gets there
             return False
         self.known.append(found)
         return True
