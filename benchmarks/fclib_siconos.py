@@ -27,6 +27,7 @@ import os
 os.environ.setdefault("OMP_NUM_THREADS", "1")
 
 import argparse
+import contextlib
 import json
 import select
 import signal
@@ -134,7 +135,7 @@ class Siconos:
         while True:
             line = self._line(child, most)
             if line is None:
-                os.kill(child, signal.SIGKILL)
+                _kill(child)
                 killed, most = True, np.inf
             elif line == ENDED:
                 return runs
@@ -145,7 +146,7 @@ class Siconos:
                              "contact_error": problem.weakest(r).error})  # fmt: skip
                 most = _cpu(child) + 2 * max(cap, 0.1)
                 if found["seconds"] > cap:
-                    os.kill(child, signal.SIGKILL)
+                    _kill(child)
                     killed, most = True, np.inf
 
     def _line(self, child=0, most=np.inf):
@@ -168,6 +169,12 @@ class Siconos:
 def _passes(found, tolerance):
     """True for a run whose answer our judge takes, in the sum and contact by contact."""
     return found["error"] <= tolerance and found["contact_error"] <= tolerance**0.5
+
+
+def _kill(child):
+    """End a process, which may have ended in the meantime."""
+    with contextlib.suppress(ProcessLookupError):
+        os.kill(child, signal.SIGKILL)
 
 
 def _cpu(pid):
