@@ -149,7 +149,7 @@ class NonlinearNewton:
                 yield from shown.best(self._newton(problem, states, target, linear, shown))
             except (Failed, InvertedCells):
                 pass  # the start was no help
-        share, step, v, reason = 0.0, 1.0, problem.known_state, ""
+        share, step, v, reason, refused = 0.0, 1.0, problem.known_state, "", ""
         creeping_helps = self.crossing is None and problem.shortest > 0
         while True:
             loaded = share > 0 or bool(problem.known_state.any())
@@ -162,6 +162,9 @@ class NonlinearNewton:
                     found = self._newton(problem, problem.states(v), target, linear, shown)
                     yield from shown.best(found, told)
                 remark = problem.at_share(share).remark(v)
+                if refused and refused != reason:
+                    told = f"a state beyond was refused: {refused}"
+                    remark = f"{told}; {remark}" if remark else told
                 hint = f"; {remark}" if remark else JUMP if self.crossing is None else ""
                 raise Breakdown(
                     f"no equilibrium found beyond {share:.4g} of the load: {reason}{hint}"
@@ -187,6 +190,7 @@ class NonlinearNewton:
                     raise self._placed(ended, known, v, target, reason) from ended
                 except (Failed, InvertedCells) as failure:
                     reason, shown.note = str(failure), note
+                    refused = reason if isinstance(failure, _Astray) else refused
                     if stuck is None and isinstance(failure, _Stuck):
                         stuck = failure.v
             if arrived is not None:
@@ -214,7 +218,7 @@ class NonlinearNewton:
         found = self._newton(then, states, target, linear, shown, creeps)
         arrived = shown.reached(found, then, states.v(states.start))
         if why := then.astray(arrived, known, jumped):
-            raise Failed(why)
+            raise _Astray(why)
         return arrived
 
     def _newton(
@@ -292,8 +296,12 @@ def _not_astray(
     """Steps from a known state; Failed where they end at one that none leads to."""
     for v, r, size in steps:
         if problem.error(r, v) <= tolerance and (why := problem.astray(v, known, jumped)):
-            raise Failed(why)
+            raise _Astray(why)
         yield v, r, size
+
+
+class _Astray(Failed):
+    """There is an equilibrium, but no step leads to it."""
 
 
 class _Stuck(Failed):
