@@ -41,3 +41,19 @@ def test_a_jump_to_cells_inside_out_is_none():
         next(shown)
     assert len(list(_checked(steps, problem, turned, np.inf))) == 2
     assert len(list(_checked(steps, problem, v, 0.0))) == 2  # on the way
+
+
+def test_the_end_tells_what_was_refused_though_other_attempts_failed_later(monkeypatch):
+    ends = iter([nonlinear._Astray("bodies 'a' and 'b' lie in each other at (0, 1)")])
+
+    def reached(*given):
+        yield from ()
+        raise next(ends, Failed("nothing leads nearer"))
+
+    monkeypatch.setattr(nonlinear.NonlinearNewton, "_reached", reached)
+    body = am.Body(am.box((1, 1), 1), am.NeoHookean(1.0, 0.3), name="body")
+    wall = am.Contact("body.top", am.Plane((0, -1), (0, 0.9)), mu=0.0)
+    model = am.Model([body], [am.Fix("body.bottom", 0)], [wall])
+    told = r"nothing leads nearer; a state beyond was refused: bodies 'a' and 'b' lie in each"
+    with pytest.raises(am.NotConverged, match=told):
+        am.solve(model)
