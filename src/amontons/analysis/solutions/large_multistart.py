@@ -50,7 +50,7 @@ class LargeSolutions(Told):
     """Solutions that were found, the first by load steps; never known to be all.
 
     starts: from which Newton's method began; failed: from which it found nothing new.  States
-    with a corner inside out that the first does not have are no solutions.
+    with a corner inside out, or bodies in each other, that the first does not have are none.
     """
 
     solutions: tuple[FrictionSolution, ...]
